@@ -45,6 +45,7 @@ async function refresh() {
       data = found;
       prepare();
       showForm();
+      showLegend();
       draw();
     }
   } catch {
@@ -75,11 +76,13 @@ function draw() {
     for (const planner of told.planners) {
       const panel = panels.get(planner.name);
       const index = data.planners.findIndex(({ name }) => name === planner.name);
-      if (!panel?.canvas.clientWidth || index < 0) continue;
+      // Without a belief, as of the planners against a person, there is nothing to show.
+      if (panel) panel.canvas.hidden = index < 0;
+      if (!panel?.canvas.clientWidth) continue;
       const frame = data.planners[index].frames[0];
       panel.view ??= viewOf(panel.canvas);
       panel.view({ ...shared, planner: index, frame: 0, next: nextOf(planner) });
-      panel.score.textContent = ` after ${frame.touches} touches${frame.score ? `: ${frame.score}` : ""}`;
+      panel.score.textContent = ` Belief after ${frame.touches} touches${frame.score ? `: ${frame.score}` : ""}`;
     }
   });
 }
@@ -99,13 +102,14 @@ function panelOf(planner) {
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "img");
   const caption = document.createElement("figcaption");
-  const [name, status, score] = ["strong", "span", "span"].map((kind) => document.createElement(kind));
+  const [name, status, score, bars] = ["strong", "span", "span", "ol"].map((kind) => document.createElement(kind));
+  bars.className = "bars";
   name.textContent = planner.name;
   caption.append(name, status, score);
-  figure.append(canvas, caption);
+  figure.append(canvas, caption, bars);
   find("panels").append(figure);
   // The view needs a first belief.
-  panel = { figure, canvas, name, status, score, view: null };
+  panel = { figure, canvas, name, status, score, bars, view: null };
   panels.set(planner.name, panel);
   new ResizeObserver(draw).observe(canvas);
   // A click, not the end of a turn.
@@ -143,13 +147,13 @@ const shownNumber = (i, number) => Number((number * factor(i)).toPrecision(6));
 function showForm() {
   const asking = told.planners.filter((it) => it.asks);
   const planner = asking.find(({ name }) => name === find("target").dataset.planner) ?? asking.find((it) => it.is_human) ?? asking[0];
-  find("target").hidden = !planner;
+  for (const id of ["target", "exact"]) find(id).hidden = !planner;
   for (const [name, { figure }] of panels) figure.classList.toggle("mine", name === planner?.name);
   if (!planner) {
     target = null;
     return;
   }
-  find("whose").textContent = `${planner.name}:`;
+  find("whose").textContent = `${planner.name}: click on the surface, or set the numbers below.`;
   find("confirm").hidden = planner.status !== "asks";
   const names = told.is_around ? ["x", "y", "z", "along x", "along y", "along z"] : told.is_line ? ["x"] : ["x", "z"];
   if (find("numbers").dataset.names !== names.join()) {
@@ -158,6 +162,7 @@ function showForm() {
       const label = document.createElement("label");
       const input = document.createElement("input");
       Object.assign(input, { type: "number", step: "any", required: true });
+      input.setAttribute("form", "target");
       input.addEventListener("input", () => {
         const inputs = [...find("numbers").querySelectorAll("input")];
         if (inputs.every((it) => it.value !== "")) target = { planner: find("target").dataset.planner, numbers: inputs.map((it, k) => Number(it.value) / factor(k)) };
@@ -179,22 +184,37 @@ function middle() {
   return [data.x, data.z].filter(Boolean).map((places) => (places[0] + places.at(-1)) / 2 / data.per_m);
 }
 
+// Shows the entries of the legend that this experiment has.
+function showLegend() {
+  const paths = data?.planners.flatMap(({ paths, touches }) => paths ?? touches.map(({ path }) => path)) ?? [];
+  const has = {
+    surface: !told.is_line, line: told.is_line, around: told.is_around, ring: !told.is_around,
+    zone: !told.is_line && !told.is_around, truth: shared.truth, stroke: paths.some((path) => path.length),
+  };
+  for (const item of document.querySelectorAll("[data-when]")) item.hidden = !has[item.dataset.when];
+}
+
 // Errors over touches, on a logarithmic axis.
 function showCurves() {
-  const [LEFT, RIGHT, TOP, BOTTOM] = [56, 710, 12, 184];
   const all = told.planners.flatMap(({ errors }) => errors.map(([, value]) => value)).filter((value) => value > 0);
   for (const id of ["curves", "curve"]) find(id).toggleAttribute("hidden", !all.length);
   if (!all.length) return;
+  const wide = find("curve").getBoundingClientRect().width || 720;
+  find("curve").setAttribute("viewBox", `0 0 ${wide} 220`);
+  const [LEFT, RIGHT, TOP, BOTTOM] = [56, wide - 10, 12, 184];
   const [low, high] = [Math.min(...all) / 1.1, Math.max(...all) * 1.1];
   const x = (touches) => LEFT + (RIGHT - LEFT) * touches / told.touches;
   const y = (value) => BOTTOM - (BOTTOM - TOP) * Math.log(value / low) / Math.log(high / low);
-  const powers = Array.from({ length: 10 }, (_, i) => 10 ** (i - 5)).flatMap((power) => [power, 2 * power, 5 * power]);
+  const digits = high > 300 * low ? [1] : [1, 2, 5];
+  const powers = Array.from({ length: 10 }, (_, i) => 10 ** (i - 5)).flatMap((power) => digits.map((digit) => digit * power));
   const ticks = powers.filter((value) => value > low && value < high);
   const parts = ticks.map((value) => `<line x1="${LEFT}" x2="${RIGHT}" y1="${y(value)}" y2="${y(value)}"/><text x="${LEFT - 6}" y="${y(value) + 4}" text-anchor="end">${label(value)}</text>`);
-  for (const touches of roundNumbers(0, told.touches, 8)) parts.push(`<text x="${x(touches)}" y="${BOTTOM + 18}" text-anchor="middle">${touches}</text>`);
+  for (const touches of roundNumbers(0, told.touches, Math.min(8, wide / 60))) parts.push(`<text x="${x(touches)}" y="${BOTTOM + 18}" text-anchor="middle">${touches}</text>`);
   for (const { colours, errors } of told.planners) {
     const points = errors.filter(([, value]) => value > 0).map(([touches, value]) => `${x(touches).toFixed(1)},${y(value).toFixed(1)}`);
     parts.push(`<polyline fill="none" stroke="${onPaper(colours)}" stroke-width="2" points="${points.join(" ")}"/>`);
+    const [left, top] = points.at(-1)?.split(",") ?? [];
+    if (top) parts.push(`<circle cx="${left}" cy="${top}" r="3" fill="${onPaper(colours)}"/>`);
   }
   parts.push(`<text x="${(LEFT + RIGHT) / 2}" y="${BOTTOM + 34}" text-anchor="middle">touches</text>`);
   find("curve").innerHTML = parts.join("");
@@ -224,8 +244,8 @@ function show(state) {
   for (const planner of state.planners) {
     const panel = panelOf(planner);
     panel.figure.style.setProperty("--own", onPaper(planner.colours));
-    panel.status.textContent = ` ${WORDS[planner.status]}, ${planner.touches} of ${state.touches}${planner.last ? `, ${planner.last}` : ""}${planner.time_s ? `, ${planner.time_s.toFixed(1)} s` : ""}. Belief`;
-    if (planner.hypotheses?.length) panel.status.textContent += ` (${planner.hypotheses.map(([name, p]) => `${name} ${p.toFixed(2)}`).join(", ")})`;
+    panel.status.textContent = ` ${WORDS[planner.status]}, ${planner.touches} of ${state.touches}${planner.last ? `, ${planner.last}` : ""}${planner.time_s ? `, ${planner.time_s.toFixed(1)} s` : ""}.`;
+    showBars(panel.bars, planner.hypotheses ?? []);
     panel.canvas.setAttribute("aria-label", `The belief of ${planner.name} after ${planner.touches} touches`);
   }
   const most = Math.max(...state.planners.map(({ touches }) => touches));
@@ -234,6 +254,7 @@ function show(state) {
   find("events").hidden = !state.log.length;
   find("log").textContent = state.log.join("\n");
   showForm();
+  showLegend();
   showCurves();
   const count = (it) => it?.planners?.map(({ touches }) => touches).join();
   if (count(before) !== count(state) || before.phase !== state.phase || before.trial !== state.trial) refresh();
@@ -308,8 +329,10 @@ find("latest").addEventListener("click", () => {
 explorer.addEventListener("change", ({ target: input }) => {
   if (input.name === "colour") shared.colour = input.value;
   if (input.name === "truth") shared.truth = input.checked;
+  showLegend();
   draw();
 });
+new ResizeObserver(() => told?.planners && showCurves()).observe(find("explorer"));
 
 // A mesh of one's own.
 const drop = document.querySelector(".drop");

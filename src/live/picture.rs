@@ -6,6 +6,7 @@ use crate::experiment::metrics::truth::Truth;
 use crate::experiment::planner_names::HUMAN;
 use crate::experiment::row::{TouchRow, TrialRow};
 use crate::experiment::store::Run;
+use crate::report::recognition::title;
 use crate::report::{explorer, solid, style, whole_object};
 use palpate_explore::evidence::End;
 use palpate_explore::task::Target;
@@ -82,7 +83,7 @@ const LIKELY: usize = 3;
 /// Returns the likeliest objects after a touch with their probabilities; none without a library.
 fn likely(touch: &TouchRow) -> Vec<(&str, f64)> {
     let found = touch.recognition.iter().flat_map(|found| &found.probabilities);
-    let mut found: Vec<(&str, f64)> = found.map(|(name, p)| (name.as_str(), *p)).collect();
+    let mut found: Vec<(&str, f64)> = found.map(|(name, p)| (title(name), *p)).collect();
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     found.truncate(LIKELY);
     found
@@ -129,6 +130,7 @@ impl Picture {
             truth.mesh = None;
             for touch in rows.iter_mut().flat_map(|row| &mut row.touches) {
                 (touch.metrics, touch.silhouette, touch.shape) = (None, None, None);
+                touch.recognition.iter_mut().for_each(|found| found.error = None);
             }
         }
         let run = Run { experiment, truth, rows, unlisted: 0 };
@@ -171,7 +173,12 @@ pub(super) struct BeliefView {
 impl BeliefView {
     /// Returns the view of the desk's experiment, that of a zone before there is one.
     pub(super) fn of(desk: Option<&Desk>) -> Self {
-        match desk.is_some_and(|desk| desk.experiment().scene.whole_object.is_some()) {
+        let scene = desk.map(|desk| &desk.experiment().scene);
+        let is_recognised = scene.is_some_and(|scene| scene.library.is_some());
+        match scene.is_some_and(|scene| scene.whole_object.is_some()) {
+            true if is_recognised => {
+                Self { scripts: &solid::SCRIPTS, colours: &solid::OBJECT_COLOURS }
+            }
             true => Self { scripts: &solid::SCRIPTS, colours: &solid::COLOURS },
             false => Self { scripts: &explorer::zone::SCRIPTS, colours: &explorer::zone::COLOURS },
         }

@@ -1,6 +1,6 @@
 //! Axes of a panel: conversion from data to pixels, with ticks at round numbers.
 
-use super::canvas::{Anchor, Area, Canvas, PointPx};
+use super::canvas::{Anchor, Area, Canvas, PartKind, PointPx};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use palpate_explore::task::Zone;
 
@@ -262,6 +262,9 @@ impl Panel {
     }
 }
 
+/// Room beside a colour bar for half a number, and above it for its name.
+const BAR_ROOM_PX: [f64; 2] = [18.0, 18.0];
+
 /// Draws a [`colour_bar`] of heights above the datum, labelled in `unit`.
 pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64; 2]) {
     let [low, high] = heights_m.map(|height_m| height_m * unit.per_m);
@@ -269,7 +272,7 @@ pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64
     colour_bar(canvas, area, &axis, &words, |t| style::height(t, 1.0));
 }
 
-/// Draws a horizontal bar of colours with its scale below.
+/// Draws a horizontal bar of colours with its scale below and its name above.
 pub fn colour_bar(
     canvas: &mut Canvas,
     area: Area,
@@ -278,6 +281,9 @@ pub fn colour_bar(
     colour: impl Fn(f64) -> String,
 ) {
     const STEPS: usize = 64;
+    let [left, top] = [area.left - BAR_ROOM_PX[0], area.top - BAR_ROOM_PX[1]];
+    let (width, height) = (area.width + 2.0 * BAR_ROOM_PX[0], area.height + 2.3 * BAR_ROOM_PX[1]);
+    canvas.part(PartKind::Key, Area { left, top, width, height });
     for i in 0..STEPS {
         let width = area.width / STEPS as f64;
         let step = Area { left: area.left + i as f64 * width, width, ..area };
@@ -290,5 +296,5 @@ pub fn colour_bar(
         canvas.line([[x, area.bottom()], [x, area.bottom() + 4.0]], &style::stroke(INK, 0.8));
         canvas.text([x, area.bottom() + 17.0], &label, SMALL_PX, Anchor::Middle);
     }
-    canvas.text([area.left - 10.0, area.bottom() - 1.0], words, TEXT_PX, Anchor::End);
+    canvas.text([area.centre()[0], area.top - 5.0], words, TEXT_PX, Anchor::Middle);
 }

@@ -55,13 +55,32 @@ pub enum Anchor {
     End,
 }
 
+/// Kind of a part of a drawing, by which a page arranges it.
+#[derive(Clone, Copy, Debug)]
+pub enum PartKind {
+    /// Legend entry, scale or colour bar.
+    Key,
+    /// Panel.
+    Panel,
+}
+
+impl PartKind {
+    /// Returns the word that marks such a part in a drawing.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Key => "key",
+            Self::Panel => "panel",
+        }
+    }
+}
+
 /// SVG drawing under construction.
 pub struct Canvas {
     width: f64,
     height: f64,
     body: String,
-    /// Titles of the panels with their positions.
-    titles: Vec<(PointPx, String)>,
+    /// Titles of the panels: place in `body`, position, words.
+    titles: Vec<(usize, PointPx, String)>,
 }
 
 impl Canvas {
@@ -69,6 +88,14 @@ impl Canvas {
     pub fn new(width: f64, height: f64) -> Self {
         let [width, height] = [width, height].map(f64::ceil);
         Self { width, height, body: String::new(), titles: Vec::new() }
+    }
+
+    /// Begins a part within `area`, to which all that is drawn until the next one belongs: a page
+    /// shows the parts side by side or, if it is narrow, below each other.
+    pub fn part(&mut self, kind: PartKind, area: Area) {
+        let Area { left, top, width, height } = area;
+        let [left, top, width, height] = [left, top, width, height].map(number);
+        self.push(&format!("<!-- {} {left} {top} {width} {height} -->", kind.word()));
     }
 
     /// Draws an open line.
@@ -170,13 +197,14 @@ impl Canvas {
     /// Sets the title of a panel, centred, after its letter (the next one of the alphabet). A
     /// single panel has no letter, so titles are written when the drawing is finished.
     pub fn title(&mut self, at: PointPx, words: &str) {
-        self.titles.push((at, words.into()));
+        self.titles.push((self.body.len(), at, words.into()));
     }
 
     fn write_titles(&mut self) {
         let titles = std::mem::take(&mut self.titles);
         let is_alone = titles.len() == 1;
-        for (i, ([x, y], words)) in titles.iter().enumerate() {
+        // The last first, so that the places of the others stay.
+        for (i, (place, [x, y], words)) in titles.iter().enumerate().rev() {
             if is_alone && words.is_empty() {
                 return;
             }
@@ -187,9 +215,11 @@ impl Canvas {
             // Spaces that no SVG reader collapses.
             let gap = if is_alone || words.is_empty() { "" } else { "\u{a0}\u{a0}" };
             let (x, y, words) = (number(*x), number(*y), escape(words));
-            self.push(&format!(
-                r#"<text x="{x}" y="{y}" font-size="{TEXT_PX}" text-anchor="middle" fill="{INK}">{letter}{gap}{words}</text>"#
-            ));
+            let title = format!(
+                "<text x=\"{x}\" y=\"{y}\" font-size=\"{TEXT_PX}\" text-anchor=\"middle\" \
+                 fill=\"{INK}\">{letter}{gap}{words}</text>\n"
+            );
+            self.body.insert_str(*place, &title);
         }
     }
 

@@ -291,7 +291,8 @@ fn draw(
     let entries = swatches.zip(names.iter().map(String::as_str));
     let size = [area.right() + 20.0, area.bottom() + 50.0];
     let mut sheet = FigureLayout::new(size, area, [0.0; 2], area.width, "", entries);
-    let panel = Panel { area: sheet.area(0, 0.0), x, y: Axis::linear(0.0, 1.0, 6.0) };
+    let area = sheet.panel(0, 0.0, [66.0, 10.0, 18.0, 44.0]);
+    let panel = Panel { area, x, y: Axis::linear(0.0, 1.0, 6.0) };
     let canvas = &mut sheet.canvas;
     panel.frame(canvas);
     let ends = reference.map(|[x, y]| panel.at(x, y));

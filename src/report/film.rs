@@ -185,9 +185,14 @@ fn solids(run: &Run, row: &TrialRow, counts: &[u32]) -> Drawings {
         return Ok(None);
     };
     let draw = |frame: &SurfaceFrame| {
-        sheet.draw(frame.touches, entries(), Some((panels.axis(), MM)), |canvas, area| {
-            panels.draw(canvas, frame, [area.left, area.bottom() - 24.0]);
-        })
+        sheet.draw(
+            frame.touches,
+            entries(),
+            panels.axis().map(|axis| (axis, MM)),
+            |canvas, area| {
+                panels.draw(canvas, frame, [area.left, area.bottom() - 24.0]);
+            },
+        )
     };
     Ok(Some(sequence.frames.par_iter().map(draw).collect()))
 }

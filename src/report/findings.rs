@@ -4,17 +4,48 @@ use super::table::{digits, shown, verdict};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::measure::{
     self, CENTRED_R, CHAMFER, COVERAGE, Direction, EDGE_RMSE, Measure, R, REACHABLE_RMSE,
-    REPEATABILITY, RMSE, VERIFICATION_COVERAGE, VERIFICATION_RMSE,
+    RECOGNISED, REPEATABILITY, RMSE, VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
 use crate::experiment::metrics::constant_r;
-use crate::experiment::row::planner_rows;
+use crate::experiment::row::{TouchRow, planner_rows};
 use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::summary::{self, CurvePoint};
+use crate::experiment::statistics::{self, curve_table};
 use crate::experiment::store::Run;
 use palpate_input::format::counted;
 
 /// Mean R (Eq. 5) from which a surface counts as found, for the paper's "almost 1".
 const R_FOUND: f64 = 0.99;
+
+/// Value of a planner with its interval, in the unit of the measure.
+pub type FinalValue<'a> = (&'a str, f64, Option<[f64; 2]>);
+
+/// Returns the measure that decides between the planners, and its value and uncertainty for each of
+/// them after the last touch: with hypotheses about the object the share of right ones, without a
+/// ground truth the error at verification touches. `None` without a value.
+pub fn final_values<'r>(run: &'r Run) -> Option<(&'static Measure, Vec<FinalValue<'r>>)> {
+    let points: Vec<(&'r str, CurvePoint)> = (run.completed_planners().into_iter())
+        .filter_map(|name| {
+            let points = summary::curve(&run.experiment, &run.rows, name);
+            Some((name, at(&points, run.experiment.touches)?.clone()))
+        })
+        .collect();
+    let values = |measure: &Measure| -> Vec<FinalValue<'r>> {
+        let value = |(name, point): &(&'r str, CurvePoint)| {
+            let summary = point.of(measure)?;
+            let is_median = measure.aggregate.has_median();
+            let value = if is_median { summary.median } else { summary.mean };
+            let ends = curve_table::uncertainty(&run.experiment, &run.rows, point, measure);
+            let shown = |value: f64| measure.unit.per_si * value;
+            Some((*name, shown(value), ends.map(|ends| ends.map(shown))))
+        };
+        points.iter().filter_map(value).collect()
+    };
+    [&RECOGNISED, run.error_measure(), &VERIFICATION_RMSE]
+        .into_iter()
+        .map(|measure| (measure, values(measure)))
+        .find(|(_, values)| !values.is_empty())
+}
 
 /// Returns warnings for the top of the page, a sentence each.
 pub fn notices(run: &Run) -> Vec<String> {
@@ -99,11 +130,11 @@ fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
         };
         let (r, centred, rmse) = (mean(&R)?, mean(&CENTRED_R)?, median(point, &RMSE)?);
         let edge = median(point, &EDGE_RMSE)
-            .map_or(String::new(), |edge| format!(", {edge} mm in the outer tenth of the zone"));
-        Some(format!("{r} (centred {centred}, median RMSE {rmse} mm{edge})"))
+            .map_or(String::new(), |edge| format!("{edge} mm in the outer tenth of the zone, "));
+        Some(format!("{rmse} mm ({edge}mean R (Eq. 5) {r}, centred {centred})"))
     };
     let found = each(curves, words)?.join("; ");
-    Some(format!("After {} the mean R (Eq. 5) is: {found}.", counted(count, "touch")))
+    Some(format!("After {} the median RMSE is: {found}.", counted(count, "touch")))
 }
 
 /// Returns the accuracy of the estimated surfaces of whole objects after the last drawn touch.
@@ -237,7 +268,8 @@ pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
     };
     let compared: Vec<String> = compared.into_iter().flatten().chain(calibration(run)).collect();
     let part = judged_part(run).filter(|_| !compared.is_empty());
-    failures(run).into_iter().chain(compared).chain(part).collect()
+    let first = failures(run).into_iter().chain(recognition(run));
+    first.chain(compared).chain(part).collect()
 }
 
 /// Ratio of the trials that detect a difference with a probability of 80 % to those whose 95 %
@@ -389,6 +421,32 @@ fn touches_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Str
     let words = words.map(String::from);
     let clauses = clauses(groups, ["needs", "need"], words)?;
     Some(format!("To reach the final error of {baseline}, {clauses}."))
+}
+
+/// Returns in how many trials each planner names the right object after the last touch, and from
+/// which touch on; `None` without hypotheses about a known object.
+fn recognition(run: &Run) -> Option<String> {
+    let clause = |name: &str| {
+        let named = planner_rows(&run.rows, name).filter_map(|row| {
+            let is_right = |touch: &TouchRow| touch.recognition.as_ref()?.is_right();
+            let known = (1..).zip(&row.touches);
+            let known: Vec<(u32, bool)> =
+                known.filter_map(|(count, touch)| Some((count, is_right(touch)?))).collect();
+            let wrong = known.iter().rposition(|(_, is_right)| !is_right);
+            let from = known.get(wrong.map_or(0, |last| last + 1));
+            (!known.is_empty()).then_some(from.map(|(count, _)| f64::from(*count)))
+        });
+        let named: Vec<Option<f64>> = named.collect();
+        let right: Vec<f64> = named.iter().copied().flatten().collect();
+        let from = statistics::median(&right)
+            .map_or(String::new(), |from| format!(", from touch {} on (median)", from.ceil()));
+        let trials = counted(named.len(), "trial");
+        (!named.is_empty()).then(|| format!("{name} in {} of {trials}{from}", right.len()))
+    };
+    let found: Vec<String> = run.experiment.planners.iter().filter_map(|it| clause(it)).collect();
+    let touches = counted(run.experiment.touches, "touch");
+    let words = || format!("The right object is named after {touches}: {}.", found.join("; "));
+    (!found.is_empty()).then(words)
 }
 
 /// Returns which planners have calibrated bands after the last touch.

@@ -38,6 +38,11 @@ const TERMS: &[(&str, &str)] = &[
         "Harmonic mean of the fractions of the estimated and of the true surface that lie within a \
          distance of the other; 1 is perfect.",
     ),
+    (
+        "ADD-S",
+        "Mean distance between the surfaces of the object at the true and at the estimated pose.",
+    ),
+    ("confusion matrices", "Numbers of trials by true and by recognised object."),
     ("standard deviation", "Uncertainty of the belief, σ of the Gaussian process."),
     ("posterior mean", "Mean of the Gaussian process, conditioned on the touches."),
     (

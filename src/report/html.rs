@@ -1,8 +1,8 @@
 //! HTML building blocks of the pages; each page is one self-contained file.
 
-use super::canvas::escape;
+use super::canvas::{PartKind, escape};
 use super::glossary::explained;
-use super::style::ON_DARK;
+use super::style::{FONT, ON_DARK};
 use super::table::{Table, wide};
 use std::fmt::Display;
 
@@ -59,10 +59,49 @@ pub(super) fn fold(summary: &str, body: &str) -> String {
     }
 }
 
-/// Returns a drawing with its caption.
+/// Returns a drawing with its caption; one of panels is cut into its parts, which a narrow page
+/// shows below each other.
 pub(super) fn figure(id: &str, svg: &str, caption: impl Display) -> String {
-    let svg = wide(svg, "figure");
+    let svg = parts(svg).unwrap_or_else(|| wide(svg, "figure"));
     format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
+}
+
+/// Returns the marked parts of a drawing, each as a drawing of its own, in a block for neighbours
+/// of one kind; `None` without panels.
+fn parts(svg: &str) -> Option<String> {
+    let [key, panel] = [PartKind::Key, PartKind::Panel].map(PartKind::word);
+    let mark = |text: &str| {
+        let kind = [key, panel].into_iter().find(|kind| text.starts_with(*kind))?;
+        let (area, body) = text[kind.len()..].split_once(" -->\n")?;
+        Some((kind, area.trim().to_owned(), body.to_owned()))
+    };
+    let svg = svg.trim_end().strip_suffix("</svg>")?;
+    let marked: Vec<_> = svg.split("<!-- ").filter_map(mark).collect();
+    if !marked.iter().any(|(kind, ..)| *kind == panel) {
+        return None;
+    }
+    let part = |(_, area, body): &(&str, String, String)| {
+        let size: Vec<&str> = area.split(' ').skip(2).collect();
+        let size = format!("width=\"{}\" height=\"{}\"", size.first()?, size.get(1)?);
+        Some(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" {size} viewBox=\"{area}\" \
+             font-family=\"{FONT}\">\n{body}</svg>\n"
+        ))
+    };
+    let block = |parts: &[(&str, String, String)]| {
+        let drawn: String = parts.iter().filter_map(part).collect();
+        // As many panels are side by side as in the drawing.
+        let ends = parts.iter().filter_map(|(_, area, _)| {
+            let numbers: Vec<f64> = area.split(' ').filter_map(|it| it.parse().ok()).collect();
+            Some([*numbers.first()?, numbers.first()? + numbers.get(2)?])
+        });
+        let [left, right] = ends.fold([f64::INFINITY, 0.0], |[left, right], end| {
+            [f64::min(left, end[0]), f64::max(right, end[1])]
+        });
+        let (kind, most) = (parts[0].0, (right - left).ceil());
+        format!("<div class=\"parts {kind}\" style=\"max-width:{most}px\">\n{drawn}</div>\n")
+    };
+    Some(marked.chunk_by(|a, b| a.0 == b.0).map(block).collect())
 }
 
 /// Returns a list of sentences; empty without any.

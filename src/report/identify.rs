@@ -1,5 +1,6 @@
 //! Sentences of an identification.
 
+use super::recognition::title;
 use crate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
 use crate::study::identify::IdentifyResult;
 use palpate_input::format::counted;
@@ -11,13 +12,8 @@ const LISTED: usize = 3;
 pub fn line(count: u32, found: &RecognitionMetrics) -> String {
     let mut likely: Vec<(&String, &f64)> = found.probabilities.iter().collect();
     likely.sort_by(|a, b| b.1.total_cmp(a.1));
-    let likely = likely.iter().take(LISTED).map(|(name, p)| format!("{} {p:.3}", named(name)));
+    let likely = likely.iter().take(LISTED).map(|(name, p)| format!("{} {p:.3}", title(name)));
     format!("touch {count:>2}: {}", likely.collect::<Vec<_>>().join(", "))
-}
-
-/// Returns the name of a hypothesis in a sentence.
-fn named(name: &str) -> &str {
-    if name == NONE { "none of these" } else { name }
 }
 
 /// Returns what is there, where, how sure, after how many touches.
@@ -28,7 +24,7 @@ pub fn conclusion(result: &IdentifyResult) -> String {
     if !*is_sure {
         return format!(
             "undecided after {touches}: most likely {} ({confidence:.3})",
-            named(&found.object)
+            title(&found.object)
         );
     }
     if found.object == NONE {

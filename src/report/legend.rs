@@ -1,6 +1,6 @@
 //! Legend of a drawing: swatches with their labels, in as many rows as they need.
 
-use super::canvas::{Anchor, Area, Canvas, PointPx};
+use super::canvas::{Anchor, Area, Canvas, PartKind, PointPx};
 use super::style::{self, INITIAL, PLANNED, TEXT_PX};
 use crate::experiment::store::Run;
 
@@ -23,7 +23,7 @@ impl<'a> Legend<'a> {
         let [mut x, mut y] = [0.0; 2];
         let mut placed = Vec::new();
         for (swatch, words) in entries {
-            let entry_px = GAPS_PX[0] + LETTER_PX * words.chars().count() as f64;
+            let entry_px = entry_px(words);
             if x > 0.0 && x + entry_px > width_px {
                 [x, y] = [0.0, y + ROW_PX];
             }
@@ -38,14 +38,27 @@ impl<'a> Legend<'a> {
         self.entries.last().map_or(0.0, |([_, y], ..)| *y)
     }
 
-    /// Draws the legend, with the middle of its first row's left end at `at`.
-    pub fn draw(&self, canvas: &mut Canvas, at: PointPx) {
+    /// Draws the legend in a group of `attributes` for each entry, with the middle of its first
+    /// row's left end at `at`.
+    pub fn draw(&self, canvas: &mut Canvas, at: PointPx, attributes: &str) {
         for ([x, y], swatch, words) in &self.entries {
             let [left, middle] = [at[0] + x, at[1] + y];
-            swatch.draw(canvas, [left + 11.0, middle]);
+            let width = entry_px(words) + GAPS_PX[1];
+            let top = middle - 0.5 * ROW_PX;
+            canvas.part(PartKind::Key, Area { left, top, width, height: ROW_PX });
+            let at = [left + 11.0, middle];
+            match attributes {
+                "" => swatch.draw(canvas, at),
+                attributes => canvas.grouped(attributes, |canvas| swatch.draw(canvas, at)),
+            }
             canvas.text([left + GAPS_PX[0], middle + 4.5], words, TEXT_PX, Anchor::Start);
         }
     }
+}
+
+/// Returns the width of an entry.
+fn entry_px(words: &str) -> f64 {
+    GAPS_PX[0] + LETTER_PX * words.chars().count() as f64
 }
 
 /// Drawing with a legend above panels of one size in columns and rows.
@@ -73,13 +86,24 @@ impl FigureLayout {
         let legend = Legend::new(legend_px, entries);
         let bottom = height + legend.more_px();
         let mut canvas = Canvas::new(width, bottom);
-        let at = [first.left, 20.0];
-        match attributes {
-            "" => legend.draw(&mut canvas, at),
-            attributes => canvas.grouped(attributes, |canvas| legend.draw(canvas, at)),
-        }
+        legend.draw(&mut canvas, [first.left, 20.0], attributes);
         let first = Area { top: first.top + legend.more_px(), ..first };
         Self { canvas, first, step, bottom }
+    }
+
+    /// Begins a panel, with `room` to the left, above, to the right and below for what is written
+    /// around it; returns its rectangle.
+    pub fn panel(&mut self, column: usize, row: f64, room: [f64; 4]) -> Area {
+        let area = self.area(column, row);
+        let [left, above, right, below] = room;
+        let part = Area {
+            left: area.left - left,
+            top: area.top - above,
+            width: area.width + left + right,
+            height: area.height + above + below,
+        };
+        self.canvas.part(PartKind::Panel, part);
+        area
     }
 
     /// Returns the rectangle of a panel.

@@ -27,6 +27,7 @@ pub mod page;
 pub mod points;
 #[cfg(feature = "pictures")]
 pub mod raster;
+pub mod recognition;
 pub mod reference;
 pub mod reliability;
 pub mod relief;
@@ -56,6 +57,7 @@ use std::path::Path;
 /// Figures in the order of the page; one line adds a figure.
 pub const FIGURES: &[ReportFigure] = &[
     figures::convergence::FIGURE,
+    figures::convergence::OTHERS,
     figures::hypotheses::FIGURE,
     figures::curves::FIGURE,
     figures::SURFACES,
@@ -100,7 +102,8 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
     let text =
         |name| palpate_input::files::text(&folder.join(name), palpate_input::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
-    let explorer = explorer::zone::section(run)? + &whole_object::section(run)?;
+    let objects = whole_object::section(run)?;
+    let explorer = if objects.is_empty() { explorer::zone::section(run)? } else { objects };
     let files = [settings.as_deref(), manifest.as_deref()];
     let html = page::html(run, analysis, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)

@@ -6,9 +6,11 @@ use super::files::FORMATS;
 use super::findings;
 use super::glossary::explained;
 use super::html::{self, fold, list, section, tables};
+use super::table::digits;
 use super::tables::{comparison, summary};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::Run;
+use palpate_input::format::counted;
 
 /// Files of a run folder that the page links to.
 const RAW: &[(&str, &str)] = &[
@@ -24,7 +26,7 @@ const RAW: &[(&str, &str)] = &[
 /// Largest number of failures listed one by one; the others are only counted.
 const FAILURES_LISTED: usize = 10;
 
-/// Returns the page as HTML: verdict, error curves and interactive view, then everything else
+/// Returns the page as HTML: final errors, verdict, error curves and interactive view, then everything else
 /// folded. `explorer` is the interactive view; `settings` and `manifest` are the texts of the files
 /// of that name, if they exist.
 pub fn html(
@@ -36,8 +38,8 @@ pub fn html(
 ) -> String {
     let equal = comparison::equal_errors(run, &analysis.equal_errors);
     let against = comparison::comparisons(run, &analysis.comparisons);
-    let figures = |is_curve: bool| -> String {
-        let drawings = drawings.iter().filter(|(it, _)| (it.name == CURVES) == is_curve);
+    let figures = |is_here: &dyn Fn(&str) -> bool| -> String {
+        let drawings = drawings.iter().filter(|(it, _)| is_here(it.name));
         drawings.map(|(it, svg)| figure(run, it, svg)).collect()
     };
     let claims = tables("", &[summary::claims(run)], "claims", summary::CLAIMS_NOTE);
@@ -46,15 +48,16 @@ pub fn html(
     let against = tables("", &against, "named", &comparison::comparisons_note(run));
     let parts = [
         list(" class=\"notices\"", &findings::notices(run)),
+        headline(run),
         verdict(run, analysis),
-        figures(true),
+        figures(&|name| OPEN.contains(&name)),
         explorer.into(),
         fold("Results next to the paper", &claims),
-        fold("Measures by number of touches", &summary),
+        fold("Other measures", &(figures(&|name| name == OTHERS) + &summary)),
         fold("Touches to equal error", &equal),
         fold("Paired comparison of planners", &against),
         fold("Misses, aborted touches and failures", &events(run)),
-        fold("Beliefs and targets", &figures(false)),
+        fold("Beliefs and targets", &figures(&|name| name != OTHERS && !OPEN.contains(&name))),
         fold("All settings, including defaults", &preformatted(settings)),
         fold("Software and machine", &preformatted(manifest)),
         fold("Files in this folder", &raw_files(drawings)),
@@ -66,8 +69,47 @@ pub fn html(
 /// Saves a figure as PNG.
 const SAVE: &str = include_str!("save.js");
 
-/// Name of the figure that stays open: errors against touches.
-const CURVES: &str = "convergence";
+/// Names of the figures that stay open: errors against touches, and hypotheses.
+const OPEN: [&str; 2] = ["convergence", "hypotheses"];
+
+/// Name of the figure of the measures that do not decide.
+const OTHERS: &str = "measures";
+
+/// Returns the final value, in large type, of the measure that decides between the planners.
+fn headline(run: &Run) -> String {
+    let Some((measure, values)) = findings::final_values(run) else { return String::new() };
+    // A share is shown in per cent.
+    let (symbol, factor) = match measure.unit.symbol {
+        "" => ("%", 100.0),
+        symbol => (symbol, 1.0),
+    };
+    let value = |(planner, value, interval): &(&str, f64, Option<[f64; 2]>)| {
+        let interval = interval.map_or(String::new(), |[low, high]| {
+            format!(" <span>[{}, {}]</span>", digits(factor * low), digits(factor * high))
+        });
+        let (planner, value) = (escape(planner), digits(factor * value));
+        format!("<div><dt>{planner}</dt> <dd><b>{value} {symbol}</b>{interval}</dd></div>\n")
+    };
+    let (statistic, band) = match measure.aggregate.has_median() {
+        true => ("Median", "95 % interval"),
+        false => ("Mean", "± one standard error"),
+    };
+    let name = measure.title.chars().take(1).flat_map(char::to_uppercase);
+    let name: String = name.chain(measure.title.chars().skip(1)).collect();
+    let title = format!("{name} after {}", counted(run.experiment.touches, "touch"));
+    let band = match values.iter().any(|(.., interval)| interval.is_some()) {
+        true => format!("; [{band}]"),
+        false => String::new(),
+    };
+    let note = format!("{statistic} of {}{band}.", summary::finished(run));
+    format!(
+        "<section class=\"headline\">\n<h2>{}</h2>\n<dl>\n{}</dl>\n<p class=\"note\">{}</p>\n\
+         </section>\n",
+        explained(&title),
+        values.iter().map(value).collect::<String>(),
+        explained(&note),
+    )
+}
 
 /// Returns the verdict: its first sentence alone, then the others, then the numbers folded.
 fn verdict(run: &Run, analysis: &Analysis) -> String {

@@ -212,6 +212,7 @@ struct Face {
 }
 
 /// Surface as faces, far ones first.
+#[derive(Default)]
 pub struct Relief {
     faces: Vec<Face>,
 }
@@ -322,16 +323,17 @@ impl Relief {
         }
     }
 
-    /// Draws a stroke along points, where the surface does not hide them.
+    /// Draws a stroke along points in a colour, where the surface does not hide them.
     pub fn stroke(
         &self,
         canvas: &mut Canvas,
         camera: &Camera,
         points: impl IntoIterator<Item = Vector3<f64>>,
+        colour: &str,
     ) {
         let points: Vec<Vector3<f64>> = points.into_iter().collect();
         for visible in points.split(|p| self.hides(camera, p)).filter(|part| part.len() > 1) {
-            canvas.line(visible.iter().map(|p| camera.at(p)), &style::slide(style::PLANNED));
+            canvas.line(visible.iter().map(|p| camera.at(p)), &style::slide(colour));
         }
     }
 

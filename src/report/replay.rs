@@ -76,7 +76,7 @@ impl<'a> BeliefReplay<'a> {
         self.metrics.map_or(String::new(), |metrics| {
             let centred = format!("{:.4}", metrics.centred_r).replace('-', "−");
             let rmse_mm = digits(1e3 * metrics.rmse_m);
-            format!("R {:.4}, centred {centred}, RMSE {rmse_mm} mm", metrics.r)
+            format!("RMSE {rmse_mm} mm, R {:.4}, centred {centred}", metrics.r)
         })
     }
 

@@ -1,9 +1,13 @@
 // Saves the figure of a button as PNG, with two pixels per unit of the drawing, on white.
 for (const button of document.querySelectorAll("button[data-png]")) {
   button.addEventListener("click", () => {
-    const svg = button.closest("figure").querySelector("svg");
-    const copy = svg.cloneNode(true);
-    const { width, height } = svg.viewBox.baseVal;
+    const figure = button.closest("figure");
+    const parts = [...figure.querySelectorAll("svg:not(svg svg)")];
+    const copy = parts[0].cloneNode();
+    const boxes = parts.map(({ viewBox: { baseVal } }) => baseVal);
+    const [width, height] = [["x", "width"], ["y", "height"]].map(([at, side]) => Math.max(...boxes.map((box) => box[at] + box[side])));
+    copy.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    for (const part of parts) copy.append(...part.cloneNode(true).childNodes);
     copy.setAttribute("width", 2 * width);
     copy.setAttribute("height", 2 * height);
     const image = new Image();

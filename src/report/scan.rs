@@ -81,7 +81,7 @@ fn draw(
         draw_scale_bar(&mut canvas, camera.px_per_m(), [BAR_LEFT_PX, top - 14.0]);
         if mesh.has_patches() {
             let hole = [(Swatch::Box(HOLE_LEGEND), "hole of the mesh, without ground truth")];
-            Legend::new(width, hole).draw(&mut canvas, [BAR_LEFT_PX, top + 24.0]);
+            Legend::new(width, hole).draw(&mut canvas, [BAR_LEFT_PX, top + 24.0], "");
         }
     }
     if let Some(contacts) = contacts {

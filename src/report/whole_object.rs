@@ -1,17 +1,17 @@
 //! Replay of beliefs of whole objects: recorded touches and hyperparameters, conditioned again and
-//! converted to surfaces.
+//! converted to surfaces. With a library, the likeliest object is that surface.
 
 use super::explorer::Counts;
 use super::figures::ReportFigure;
+use super::recognition::LibraryMeshes;
 use super::replay;
-use super::solid::{self, PlannerSurfaces, SolidTouch, SurfaceFrame, counts};
+use super::solid::{self, PlannerSurfaces, SolidTouch, SurfaceFrame, counts, error_m};
 use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::metrics::shape::ShapeMetrics;
-use crate::experiment::row::{TouchRow, TrialRow};
+use crate::experiment::row::TrialRow;
 use crate::experiment::store::Run;
 use anyhow::Context;
-use nalgebra::Point3;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::decimate::decimate;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -20,18 +20,25 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 // heuristic: a page stays a few megabytes.
 const TRIANGLES: usize = 3000;
 
-/// Returns the true surface that the run stores, with its search tree; `None` if it stores none.
+/// Returns the true surface that the run stores, or that of the drawn trial's object of a library,
+/// with its search tree; `None` if it is not known.
 pub fn truth(run: &Run) -> Option<MeshBvh> {
-    run.truth.mesh.as_deref().cloned().map(MeshBvh::new)
+    let drawn = || LibraryMeshes::of(run)?.truth(run);
+    run.truth.mesh.as_deref().cloned().or_else(drawn).map(MeshBvh::new)
 }
 
-/// Returns the interactive part of the page; empty for a run over a zone.
+/// Returns whether a run is about a whole object, or about objects of a library.
+fn has_solids(run: &Run) -> bool {
+    run.experiment.scene.whole_object.is_some() || run.experiment.scene.library.is_some()
+}
+
+/// Returns the interactive part of the page; empty for a run over a zone without a library.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
 pub fn section(run: &Run) -> anyhow::Result<String> {
     let experiment = &run.experiment;
-    if experiment.scene.whole_object.is_none() {
+    if !has_solids(run) {
         return Ok(String::new());
     }
     let truth = truth(run);
@@ -42,20 +49,21 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     solid::section(&sequences, mesh, experiment.report.trial)
 }
 
-/// Figure of estimated surfaces of whole objects, by planner and touch count; `None` for a run over
-/// a zone.
+/// Figure of estimated surfaces of whole objects or of recognised objects, by planner and touch
+/// count; `None` for a run over a zone without a library.
 pub const FIGURE: ReportFigure = ReportFigure {
     name: "solids",
     caption: |run| {
-        format!(
-            "Estimated surfaces of trial {} from the front and from behind, coloured by their standard \
-             deviation, with the touches.",
-            run.experiment.report.trial
-        )
+        let what = match run.experiment.scene.library {
+            Some(_) => "Likeliest objects of trial # at their estimated poses",
+            None => "Estimated surfaces of trial #, coloured by their standard deviation",
+        };
+        let what = what.replace('#', &run.experiment.report.trial.to_string());
+        format!("{what}, from the front and from behind, with the touches.")
     },
     draw: |run| {
         let experiment = &run.experiment;
-        if experiment.scene.whole_object.is_none() {
+        if !has_solids(run) {
             return Ok(None);
         }
         let (counts, truth) = (experiment.drawn_touch_counts(), truth(run));
@@ -77,6 +85,10 @@ pub fn sequences(
     truth: Option<&MeshBvh>,
 ) -> anyhow::Result<Vec<PlannerSurfaces>> {
     let initial_touches = run.experiment.initial_touches as usize;
+    let (zone, library) = (run.experiment.scene.zone.as_ref(), LibraryMeshes::of(run));
+    if zone.is_some() && library.is_none() {
+        return Ok(Vec::new());
+    }
     let sequence = |row: &TrialRow| -> anyhow::Result<PlannerSurfaces> {
         let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
         let mut sequence =
@@ -85,15 +97,27 @@ pub fn sequences(
             let no_aim = || {
                 format!("{}: the target has no direction, which a whole object needs", place(i + 1))
             };
-            let aim = touch.target.aim().with_context(no_aim)?;
+            let (aim_w, along_w) = match zone {
+                Some(zone) => (zone.point(&touch.target.numbers(), 0.0), *zone.ahead_w()),
+                None => {
+                    let aim = touch.target.aim().with_context(no_aim)?;
+                    (aim.p_w, *aim.direction_w)
+                }
+            };
+            let contact_w = touch.contact();
             sequence.touches.push(SolidTouch {
-                aim_w: aim.p_w,
-                along_w: *aim.direction_w,
-                contact_w: touch.contact(),
+                aim_w: contact_w.filter(|_| zone.is_some()).unwrap_or(aim_w),
+                along_w,
+                contact_w,
+                path_w: touch.slid_w().unwrap_or_default(),
                 is_initial: i < initial_touches,
             });
         }
         let frame = |&count: &u32| {
+            if let Some(library) = &library {
+                let touch = row.touches.get((count as usize).wrapping_sub(1));
+                return Ok(touch.and_then(|it| library.frame(it, count, truth, TRIANGLES)));
+            }
             let frame = frame(&run.experiment, row, count, truth, TRIANGLES);
             frame.with_context(|| format!("{} cannot be drawn", place(count as usize)))
         };
@@ -131,16 +155,13 @@ pub fn frame(
         format!("{chamfer}, F {:.2} at 1 %", shape.f_1)
     };
     let shape = touches.last().and_then(|touch| touch.shape.as_ref());
-    let error = |bvh: &MeshBvh, p_w: &Point3<f64>| {
-        let distance_m = bvh.closest_point(p_w).distance_m;
-        if bvh.is_enclosed(p_w) { -distance_m } else { distance_m }
-    };
     Ok(Some(SurfaceFrame {
         touches: count,
         sd_m: surface.offsets_m(&mesh.0),
-        error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
+        error_m: truth
+            .map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error_m(bvh, p_w)).collect()),
         score: shape.map(score).unwrap_or_default(),
-        slid_w: touches.iter().filter_map(TouchRow::slid_w).collect(),
+        hypotheses: Vec::new(),
         seen_w: belief.seen().iter().flat_map(|it| it.elements()).map(|it| it.p_w).collect(),
         mesh,
     }))

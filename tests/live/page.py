@@ -88,6 +88,18 @@ def bring(page: Page, mesh: str, planners: list[str], around: bool = False) -> N
     expect(page.locator("#explorer")).to_be_visible(timeout=LONGEST_MS)
 
 
+def fits(page: Page) -> None:
+    """Checks that nothing is wider than a phone, in one column, and that a finger hits each control."""
+    wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+    assert wide <= 0, f"the page is {wide} pixels too wide"
+    scrolled = page.evaluate("[...document.querySelectorAll('body *')].filter(it => it.scrollWidth > it.clientWidth + 1 && getComputedStyle(it).overflowX !== 'visible' && it.clientWidth).map(it => it.outerHTML.slice(0, 80))")
+    assert not scrolled, f"scroll sideways: {scrolled}"
+    lefts = page.evaluate("new Set([...document.querySelectorAll('#panels figure')].map(it => Math.round(it.getBoundingClientRect().left))).size")
+    assert lefts <= 1, f"{lefts} columns"
+    low = page.evaluate("[...document.querySelectorAll('button, select, input[type=number]')].filter(it => it.checkVisibility() && it.getBoundingClientRect().height < 39.5).map(it => it.outerHTML.slice(0, 80))")
+    assert not low, f"lower than 40 pixels: {low}"
+
+
 def choose(page: Page, index: int) -> None:
     """Clicks a little beside the middle of a canvas."""
     box = page.locator("#panels canvas").nth(index).bounding_box()
@@ -187,7 +199,7 @@ def main() -> None:
         # By keyboard alone.
         page.locator("#numbers input").first.focus()
         page.keyboard.press("Tab")
-        focused = page.evaluate("document.activeElement.closest('form')?.id")
+        focused = page.evaluate("document.activeElement.form?.id")
         assert focused == "target", focused
         page.locator("#numbers input").first.focus()
         page.keyboard.press("ArrowUp")
@@ -196,10 +208,22 @@ def main() -> None:
         print("keyboard")
         axe(page, args.axe, "running")
 
+        # The legend names what is drawn, and the numbers are below the experiment.
+        legend = page.locator(".legend").inner_text()
+        for words in ["initial touch", "no contact", "next target", "out of the finger"]:
+            assert words in legend, f"{words} is not in {legend}"
+        for words in ["approach of the last touch", "95 % band"]:
+            assert words not in legend, f"{words} is in {legend}"
+        assert page.locator("#numbers input").first.evaluate("it => getComputedStyle(it).opacity") == "1"
+        below = page.locator("#exact").bounding_box()["y"]
+        for part in ["#panels", "#target", ".time", ".legend"]:
+            box = page.locator(part).bounding_box()
+            assert box["y"] + box["height"] <= below, f"{part} is below the numbers"
+
         # On a phone, and on dark paper.
-        page.set_viewport_size({"width": 360, "height": 740})
-        wide = page.evaluate("document.documentElement.scrollWidth")
-        assert wide <= 360, f"the page is {wide} pixels wide"
+        page.set_viewport_size({"width": 380, "height": 740})
+        time.sleep(0.3)
+        fits(page)
         picture(page, "3-phone")
         page.emulate_media(color_scheme="dark")
         time.sleep(0.3)
@@ -222,6 +246,7 @@ def main() -> None:
         when(lambda: touches(page, "active") == made + 1, "one touch is not one touch")
         page.wait_for_function("told?.planners.every(it => it.status === 'held')", timeout=LONGEST_MS)
         assert touches(page, "active") == made + 1
+        assert "approach of the last touch" in page.locator(".legend").inner_text()
         picture(page, "5-around")
         choose(page, 0)
         page.click("#target button[type=submit]")

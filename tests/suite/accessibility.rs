@@ -109,7 +109,7 @@ fn a_bad_page_is_found() {
     }
 }
 
-/// Pages of a curve, a surface, a whole object, a run in which each trial of a planner fails, and a
+/// Pages of a curve, a surface, a whole object, recognised objects, strokes, a run in which each trial of a planner fails, and a
 /// comparison.
 #[test]
 #[ignore = "needs axe-core: make test PART=page"]
@@ -123,10 +123,14 @@ fn report_pages_are_accessible() {
         let output = palpate(Path::new("."), &[&["--quiet"], arguments].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     };
-    let runs: [(&str, &str, &[&str]); 3] = [
+    let few = "scene.library.objects=[\"box\", \"bottle\"]";
+    let strokes = "planners=[\"random_strokes\"]";
+    let runs: [(&str, &str, &[&str]); 5] = [
         ("toy", "toy", &["trials=6", "touches=30"]),
         ("bird", "bird", &["trials=6", "touches=30", "grid=21"]),
         ("around", "around", &["trials=1", "touches=7", "planners=[\"active\", \"random\"]"]),
+        ("library", "lookalikes", &["trials=2", "touches=3", "recognition.particles=64", few]),
+        ("strokes", "container_strokes", &["trials=1", "touches=6", strokes]),
     ];
     for (name, experiment, sets) in runs {
         let out = at(name);

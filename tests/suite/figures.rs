@@ -145,7 +145,7 @@ fn a_millimetre_is_as_long_on_both_axes() {
 #[test]
 fn every_measure_has_a_band_from_the_first_belief_on() {
     let run = run(SURFACE);
-    let svg = figure(&run, "convergence");
+    let svg = figure(&run, "measures");
     let panels = svg.matches(">touches</text>").count();
     assert!(panels >= 6, "{panels}");
     assert_eq!(
@@ -158,11 +158,11 @@ fn every_measure_has_a_band_from_the_first_belief_on() {
     let letter = |line: &'_ str| line.split("bold\">").nth(1)?.chars().next();
     let written: String = written.filter_map(letter).collect();
     assert_eq!(written, letters);
-    // The frame of the first column is at 70.
+    // The frame of the first column is at 64.
     let curves: Vec<&str> =
         svg.lines().filter(|line| line.contains("stroke-width=\"2\"")).collect();
-    let at_frame = curves.iter().filter(|line| line.starts_with("<path d=\"M70 ")).count();
-    assert_eq!(at_frame, panels.div_ceil(2) * run.experiment.planners.len());
+    let at_frame = curves.iter().filter(|line| line.starts_with("<path d=\"M64 ")).count();
+    assert_eq!(at_frame, panels.div_ceil(3) * run.experiment.planners.len());
 }
 
 #[test]

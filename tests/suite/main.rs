@@ -37,6 +37,7 @@ mod dynamic;
 mod effects;
 mod examples;
 mod experiments;
+mod explorer;
 #[cfg(feature = "pictures")]
 mod figures;
 mod files;

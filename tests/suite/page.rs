@@ -56,9 +56,24 @@ const key = (key) => () => explorer.querySelector("canvas").dispatchEvent(new Ke
 })();
 "#;
 
-/// A headless browser's clock runs ahead of its frames, so drawing waits for the clock.
-pub const CLOCK: &str =
-    "<script>window.requestAnimationFrame = (draw) => setTimeout(draw);</script>";
+/// A headless browser's clock runs ahead of its frames, so drawing waits for the clock. The texts
+/// of the last picture on a canvas are kept, each with its box; those that are rotated are not.
+pub const CLOCK: &str = r#"<script>
+window.requestAnimationFrame = (draw) => setTimeout(draw);
+window.written = [];
+const { getContext } = HTMLCanvasElement.prototype;
+HTMLCanvasElement.prototype.getContext = function (...kind) {
+  if (this.isConnected) window.written = [];
+  return getContext.apply(this, kind);
+};
+const { fillText } = CanvasRenderingContext2D.prototype;
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  const { width } = this.measureText(text);
+  const left = x - width * { left: 0, start: 0, center: 0.5, right: 1 }[this.textAlign];
+  if (this.getTransform().b === 0) window.written.push({ text, left, right: left + width, top: y - 9, bottom: y });
+  fillText.call(this, text, x, y);
+};
+</script>"#;
 
 fn browser() -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
@@ -119,6 +134,32 @@ addEventListener("load", () => setTimeout(() => {
   for (const line of document.querySelectorAll("figure svg [stroke-width='2']:not(.relief *)")) {
     say(name, "curves", contrast(style(line).stroke, ground(line.closest("figure"))), line.getAttribute("stroke"));
   }
+  // Texts that overlap, of each drawing and of the interactive view, and those beyond its edges.
+  const overlaps = (boxes) => boxes.flatMap((a, i) => boxes.slice(0, i)
+    .filter((b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 2 && b.top < a.bottom - 2)
+    .map((b) => `${a.text} on ${b.text}`));
+  for (const svg of document.querySelectorAll("figure svg:not(svg svg)")) {
+    const boxes = [...svg.querySelectorAll("text")].map((text) => {
+      const { left, right, top, bottom } = text.getBoundingClientRect();
+      return { left, right, top, bottom, text: text.textContent };
+    });
+    const { left, right } = svg.getBoundingClientRect();
+    const cut = boxes.filter((box) => box.left < left - 1 || box.right > right + 1).map(({ text }) => `${text} is cut off`);
+    say(name, "overlaps", [...overlaps(boxes), ...cut].join(", "));
+  }
+  const canvas = document.querySelector("#explorer canvas");
+  const beyond = window.written.filter(({ left, right }) => left < 0 || right > canvas.clientWidth).map(({ text }) => `${text} is cut off`);
+  say(name, "canvas texts", window.written.length);
+  say(name, "overlaps", [...overlaps(window.written), ...beyond].join(", "));
+  for (const block of document.querySelectorAll(".parts.panel")) {
+    const boxes = [...block.children].map((part) => part.getBoundingClientRect());
+    say(name, "columns", new Set(boxes.map(({ left }) => Math.round(left))).size, boxes.length);
+    say(name, "panel more", Math.max(...boxes.map(({ right }) => right)) - innerWidth);
+  }
+  const size = (selector) => parseFloat(style(document.querySelector(selector)).fontSize);
+  say(name, "headline", size(".headline b") / size("body"), document.querySelector(".headline").textContent.replace(/\s+/g, " ").trim());
+  say(name, "headline first", top(".headline") < top(".verdict"));
+  say(name, "others folded", document.querySelector("#measures").closest("details") !== null, document.querySelector("#convergence").closest("details") === null);
   for (const box of document.querySelectorAll(".wide")) {
     const more = box.scrollWidth - box.clientWidth;
     const what = box.getAttribute("aria-label");
@@ -195,8 +236,8 @@ fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
     log(browser, &page(folder.path(), &run(settings), DRIVER), &[])
 }
 
-/// Page widths, pixels: narrower than a phone, a small window, a large one.
-const WIDTHS: [u32; 3] = [1400, 800, 400];
+/// Page widths, pixels: a phone, a small window, a large one.
+const WIDTHS: [u32; 3] = [1400, 900, 380];
 
 /// Contrasts required by WCAG 2.2 for text (1.4.3, AA) and for graphics (1.4.11).
 const WORDS_CONTRAST: f64 = 4.5;
@@ -205,8 +246,9 @@ const SHAPE_CONTRAST: f64 = 3.0;
 // heuristic: readable without magnification.
 const FIGURE_WORDS_PX: f64 = 9.0;
 
-/// At every width, on light and dark backgrounds: the page does not scroll sideways; tables and
-/// figures scroll in their boxes, with a cue and a fixed first column; all text is readable.
+/// At every width, on light and dark backgrounds: the page does not scroll sideways; tables scroll
+/// in their boxes, with a cue and a fixed first column, and panels are in one column on a phone; all
+/// text is readable, and none is printed over another.
 #[test]
 fn the_page_fits_every_width_on_light_and_dark_paper() {
     let Some(browser) = browser_or_note() else { return };
@@ -248,14 +290,31 @@ fn the_page_fits_every_width_on_light_and_dark_paper() {
             for line in said("curves").into_iter().filter(|_| is_dark) {
                 assert!(number(line) >= SHAPE_CONTRAST, "{place}: {line:?}");
             }
-            for what in ["table", "figure"] {
-                let wider = said(&format!("{what} more"));
-                let is_wider = wider.iter().any(|line| number(line) > 0.0);
-                assert!(is_wider || width > 400, "{place}: no {what} is wider than the page");
-                for line in said(&format!("{what} cue")) {
-                    assert_eq!(line[2], "local, local, scroll, scroll", "{place}: {what}");
-                }
+            let is_wider = said("table more").iter().any(|line| number(line) > 0.0);
+            assert!(is_wider || width > 400, "{place}: no table is wider than the page");
+            for line in said("table cue") {
+                assert_eq!(line[2], "local, local, scroll, scroll", "{place}");
             }
+            assert!(said("figure more").is_empty(), "{place}: a figure is not cut into panels");
+            for line in said("panel more") {
+                assert!(number(line) <= 0.0, "{place}: {line:?}");
+            }
+            let columns = said("columns");
+            assert!(columns.len() > 3, "{place}: {columns:?}");
+            let most = columns.iter().map(|line| number(line)).fold(0.0, f64::max);
+            assert_eq!(most == 1.0, width < 700, "{place}: {columns:?}");
+            for line in said("overlaps") {
+                assert_eq!(line[2], "", "{place}");
+            }
+            assert!(number(said("canvas texts")[0]) > 5.0, "{place}");
+            let headline = said("headline")[0];
+            assert!(number(headline) >= 1.8, "{place}: {headline:?}");
+            assert!(
+                headline[3].starts_with("RMSE after 20 touches random 2.00 mm"),
+                "{headline:?}"
+            );
+            assert_eq!(said("headline first")[0][2], "true", "{place}");
+            assert_eq!(said("others folded")[0][2..], ["true", "true"], "{place}");
             for line in said("sheet") {
                 assert_eq!(line[2], "none", "{place}: a sheet covers the cue");
             }
@@ -282,7 +341,7 @@ fn what_is_moved_and_clicked_changes_what_is_drawn() {
         }
     }
     let words = |act: usize| surface[act][2].as_str();
-    assert!(words(0).starts_with("random after 20 touches: R 0.99"), "{}", words(0));
+    assert!(words(0).starts_with("random after 20 touches: RMSE 1.00 mm, R 0.99"), "{}", words(0));
     assert!(words(1).starts_with("random after 7 touches"), "{}", words(1));
     assert!(words(2).starts_with("active after 7 touches"), "{}", words(2));
     assert!(!words(8).starts_with("active after 7 touches"), "{}", words(8));

@@ -44,8 +44,8 @@ fn text<'a>(files: &'a BTreeMap<String, Vec<u8>>, name: &str) -> &'a str {
 #[test]
 fn figures_are_whole() {
     for (settings, names) in [
-        (CURVE, ["acquisition", "convergence", "curves"].as_slice()),
-        (SURFACE, &["acquisition", "convergence", "surfaces", "targets"]),
+        (CURVE, ["acquisition", "convergence", "curves", "measures"].as_slice()),
+        (SURFACE, &["acquisition", "convergence", "measures", "surfaces", "targets"]),
     ] {
         let files = drawn(&run(settings));
         let svgs: Vec<&str> = files.keys().filter_map(|name| name.strip_suffix(".svg")).collect();
@@ -74,7 +74,7 @@ fn page_needs_nothing_and_trusts_nothing() {
     assert_eq!(page.matches("</script").count(), 2);
     assert!(page.contains("&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &amp; &quot;this"));
     assert!(page.contains("After 12 touches"));
-    assert_eq!(page.matches("<figure").count(), 3);
+    assert_eq!(page.matches("<figure").count(), 4);
 }
 
 #[test]
@@ -253,9 +253,10 @@ fn recognition() -> RecognitionMetrics {
         object: "box".into(),
         probabilities: [("box".to_owned(), 0.9), (NONE.to_owned(), 0.1)].into(),
         predictive_nats: 3.0,
-        pose: PoseRow { position_m, rotation_deg, distance_95_m: 1e-3 },
+        pose: PoseRow { object: "box".into(), position_m, rotation_deg, distance_95_m: 1e-3 },
         error: Some(RecognitionError {
             object: "box".into(),
+            pose: Some([position_m, rotation_deg]),
             hypothesis: "box".into(),
             probability: 0.9,
             distance_m: Some(5e-4),
@@ -291,7 +292,8 @@ fn a_measure_is_told_wherever_measures_are() {
     let (summary, comparison) = (read("summary.csv"), read("comparison.csv"));
     let columns: Vec<&str> = summary.lines().next().unwrap().split(',').collect();
     let files = drawn(&run);
-    let (page, figure) = (text(&files, "report.html"), text(&files, "convergence.svg"));
+    let page = text(&files, "report.html");
+    let figure = ["convergence.svg", "measures.svg"].map(|name| text(&files, name)).concat();
     let (claims, tables) = page.split_once("over the trials.").unwrap();
     for measure in MEASURES {
         let has = |statistic: &str| columns.contains(&measure.column(statistic).as_str());

@@ -236,10 +236,16 @@ impl TouchRow {
         self.outcome.contact().map(|contact| contact.p_wc)
     }
 
+    /// Whether the finger slid along the surface.
+    pub fn is_stroke(&self) -> bool {
+        self.contact().is_some() && self.target.slide_m() > 0.0
+    }
+
     /// Returns the points along a stroke with contact, in `W`, m.
     pub fn slid_w(&self) -> Option<Vec<Point3<f64>>> {
-        let is_stroke = self.contact().is_some() && self.target.slide_m() > 0.0;
-        is_stroke.then(|| self.outcome.points().iter().map(|point| point.p_wc).collect())
+        let points = self.outcome.points();
+        let is_line = self.is_stroke() && points.len() > 1;
+        is_line.then(|| points.iter().map(|point| point.p_wc).collect())
     }
 
     /// Positions of the finger for [travel](TrialRow::path_m): one, or both ends of a stroke.

@@ -44,6 +44,8 @@ pub struct TrueObject {
     pub class: String,
     /// Pose of its frame `O` in `W`.
     pub x_wo: Isometry3<f64>,
+    /// Pose of the frame of its mesh file in `W`.
+    pub x_wm: Isometry3<f64>,
     /// Offset from the middle of the prior, m.
     pub offset_m: [f64; 3],
 }
@@ -187,14 +189,14 @@ impl LoadedLibrary {
         let (name, class) = (object.name.clone(), object.class.clone());
         let offset_m = x_wo.translation.vector - prior.middle(object).coords;
         let (number, offset_m) = (self.known.position(&name), offset_m.into());
-        TrueObject { number, name, class, x_wo, offset_m }
+        TrueObject { number, name, class, x_wo, x_wm: x_wo * object.x_om(), offset_m }
     }
 
     /// Returns a scene with an object drawn for it.
     pub fn place(&self, scene: &Scene, drawn: &TrueObject) -> Scene {
         let found = self.all.iter().find(|(_, object)| object.name == drawn.name);
-        let object = found.map(|(mesh, object)| {
-            let (position_m, rotation_deg) = parts(&(drawn.x_wo * object.x_om()));
+        let object = found.map(|(mesh, _)| {
+            let (position_m, rotation_deg) = parts(&drawn.x_wm);
             ObjectSettings {
                 mesh: mesh.clone().into(),
                 allow_external_buffers: false,

@@ -12,17 +12,16 @@ function curveView(canvas) {
     context.strokeStyle = paint("line");
     context.fillStyle = paint("ink");
     context.beginPath();
-    context.textAlign = "center";
-    for (const x of roundNumbers(x0, x1, 8)) {
+    const write = writer(context);
+    for (const x of roundNumbers(x0, x1, Math.min(8, width / 50))) {
       context.moveTo(at(x, y0)[0], top);
       context.lineTo(at(x, y0)[0], top + height);
-      context.fillText(label(x), at(x, y0)[0], top + height + 16);
+      write(label(x), at(x, y0)[0], top + height + 16, "center");
     }
-    context.textAlign = "right";
     for (const y of roundNumbers(y0, y1, height / 50)) {
       context.moveTo(left, at(x0, y)[1]);
       context.lineTo(left + width, at(x0, y)[1]);
-      context.fillText(label(y), left - 7, at(x0, y)[1] + 4);
+      write(label(y), left - 7, at(x0, y)[1] + 4, "right");
     }
     context.stroke();
     context.strokeStyle = paint("frame");
@@ -74,9 +73,12 @@ function curveView(canvas) {
   function drawTouches(context, at, frame, planner) {
     const shown = data.planners[planner].contacts.slice(0, frame.touches);
     shown.forEach(([x, h], i) => {
+      const pair = i < data.initial_touches ? data.colours.initial : data.colours.later;
+      const path = data.planners[planner].paths[i].map(([x, h]) => at(x, h));
+      if (path.length) return drawStroke(context, path, pair, () => false, i === shown.length - 1);
       const [left, top] = at(x, h === null ? data.space[0] : h);
       const arm = i === shown.length - 1 ? 6 : 4;
-      for (const [ink, width] of [[paint("paper"), 4.5], [onPaper(i < data.initial_touches ? data.colours.initial : data.colours.later), 2]]) {
+      for (const [ink, width] of [[paint("paper"), 4.5], [onPaper(pair), 2]]) {
         context.strokeStyle = ink;
         context.lineWidth = width;
         context.beginPath();

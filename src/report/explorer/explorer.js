@@ -31,6 +31,7 @@ function show(touches) {
   const words = `${name} after ${frame.touches} ${frame.touches === 1 ? "touch" : "touches"}`;
   slider.setAttribute("aria-valuetext", words);
   explorer.querySelector("output").textContent = `${words}: ${frame.score}`;
+  showBars(explorer.querySelector(".bars"), frame.hypotheses);
   canvas.setAttribute("aria-label", `The belief of ${words}`);
   draw();
 }

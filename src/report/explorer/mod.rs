@@ -64,7 +64,7 @@ impl InteractiveView<'_> {
              <canvas class=\"{}\" role=\"img\" tabindex=\"0\"></canvas>\n\
              <div class=\"time\"><button type=\"button\">Play</button>\
              <input type=\"range\" min=\"0\" max=\"{last}\" value=\"{last}\" aria-label=\"touches\">\
-             </div>\n<output></output>\n<p class=\"note\">{}</p>\n\
+             </div>\n<output></output>\n<ol class=\"bars\"></ol>\n<p class=\"note\">{}</p>\n\
              <script type=\"application/json\" id=\"explorer-data\">{json}</script>\n\
              <script>\n{}\n{CONTROLS}</script>\n</section>\n",
             self.class,
@@ -102,6 +102,21 @@ pub fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T
         })
         .collect();
     format!("<fieldset><legend>{name}</legend>{buttons}</fieldset>\n")
+}
+
+/// Sentence that explains the drawing of strokes.
+pub const STROKES: &str = " Blue and red lines: strokes, from the dot at their begin to their end.";
+
+/// Largest number of points of a stroke.
+// heuristic: more would not be visible.
+const PATH_POINTS: usize = 24;
+
+/// Returns evenly spaced points of a path, with its ends.
+pub fn thinned<T>(path: &[T]) -> impl Iterator<Item = &T> {
+    let last = path.len().saturating_sub(1);
+    let steps = last.min(PATH_POINTS - 1);
+    let count = if path.is_empty() { 0 } else { steps + 1 };
+    (0..count).map(move |i| &path[i * last / steps.max(1)])
 }
 
 /// Rounds a number to the digits that are visible; one that is not finite becomes null in JSON.

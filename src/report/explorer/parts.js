@@ -57,6 +57,20 @@ function pen(canvas) {
   return { context, width, height, ratio };
 }
 
+// Returns a function that writes a text at a place, unless it would overlap one before it.
+function writer(context) {
+  const boxes = [];
+  return (text, x, y, align) => {
+    const { width } = context.measureText(text);
+    const left = x - width * { left: 0, center: 0.5, right: 1 }[align];
+    const box = [left - 3, y - 9, left + width + 3, y + 2];
+    if (boxes.some(([a, b, c, d]) => box[0] < c && a < box[2] && box[1] < d && b < box[3])) return;
+    boxes.push(box);
+    context.textAlign = align;
+    context.fillText(text, x, y);
+  };
+}
+
 // Colour scale: its stops, the position of a value from 0 to 1, values to label, words.
 function deviationScale([least, most], words = "standard deviation σ") {
   const at = (value) => Math.log(value / least) / Math.log(most / least);
@@ -69,8 +83,9 @@ function deviationScale([least, most], words = "standard deviation σ") {
 function errorScale(limit, words) {
   const fine = (value) => Math.asinh(value / (0.03 * limit));
   const at = (value) => 0.5 + 0.5 * fine(value) / fine(limit);
-  const powers = [0.01, 0.1, 1, 10, 100].filter((power) => power > 0.02 * limit && power <= limit);
-  const ticks = [...powers.flatMap((power) => [-3 * power, -power, power, 3 * power]), 0];
+  const powers = [100, 10, 1, 0.1, 0.01].filter((power) => power > 0.02 * limit && power <= limit);
+  // The first ones have room for their numbers.
+  const ticks = [0, ...powers.flatMap((power) => [-3 * power, 3 * power, -power, power])];
   return { stops: data.colours.error, at, ticks, words };
 }
 
@@ -82,6 +97,7 @@ function colour({ stops }, fraction) {
 }
 
 function drawColours(context, width, height, scale) {
+  if (!scale.words) return;
   // Without room beside the bar, the words are above it.
   const length = Math.min(320, width - 40);
   const isNarrow = width < 720;
@@ -94,12 +110,12 @@ function drawColours(context, width, height, scale) {
   context.textAlign = isNarrow ? "center" : "right";
   const [wordsX, wordsY] = isNarrow ? [width / 2, top - 8] : [left - 12, top + 11];
   context.fillText(`${scale.words} (${data.unit})`, wordsX, wordsY);
-  context.textAlign = "center";
+  const write = writer(context);
   for (const tick of scale.ticks) {
     const fraction = scale.at(tick);
     if (fraction < -1e-9 || fraction > 1 + 1e-9) continue;
     context.fillRect(left + fraction * length - 0.5, top + 12, 1, 4);
-    context.fillText(label(tick), left + fraction * length, top + 29);
+    write(label(tick), left + fraction * length, top + 29, "center");
   }
 }
 
@@ -119,6 +135,39 @@ function drawTouch(context, [x, y], pair, kind, isLast) {
   context.lineWidth = 1.3;
   if (kind !== "miss") context.fill();
   context.stroke();
+}
+
+// Draws a stroke from a dot at its begin, pale where the surface hides it.
+function drawStroke(context, points, pair, isHidden, isLast) {
+  context.globalAlpha = 1;
+  for (const [ink, more] of [["#fff", 2.4], [pair[0], 0]]) {
+    context.strokeStyle = context.fillStyle = ink;
+    context.lineWidth = (isLast ? 3.6 : 2) + more;
+    points.slice(1).forEach((to, i) => {
+      context.globalAlpha = isHidden(to) ? 0.3 : 1;
+      context.beginPath();
+      context.moveTo(points[i][0], points[i][1]);
+      context.lineTo(to[0], to[1]);
+      context.stroke();
+    });
+    context.globalAlpha = isHidden(points[0]) ? 0.3 : 1;
+    context.beginPath();
+    context.arc(points[0][0], points[0][1], (isLast ? 4.4 : 3) + more / 2, 0, 7);
+    context.fill();
+  }
+  context.globalAlpha = 1;
+}
+
+// Shows probabilities of objects as bars.
+function showBars(list, hypotheses = []) {
+  list.replaceChildren(...hypotheses.map(([name, share]) => {
+    const item = document.createElement("li");
+    const number = document.createElement("span");
+    number.textContent = share.toFixed(2);
+    item.append(name, " ", number);
+    item.style.setProperty("--share", `${100 * share}%`);
+    return item;
+  }));
 }
 
 // Draws where the next touch will be.

@@ -135,14 +135,12 @@ function reliefView(canvas) {
     line(context, [[x0, z0], [x1, z0], [x1, z1], [x0, z1], [x0, z0]].map(([x, z]) => project(x, h0, z)));
     line(context, [[x0, h0], [x0, h1], [x1, h1], [x1, h0]].map(([x, h]) => project(x, h, z0)));
     context.fillStyle = paint("faint");
-    const write = (text, [x, y], dx, dy, align) => {
-      context.textAlign = align;
-      context.fillText(text, x + dx, y + dy);
-    };
-    for (const x of roundNumbers(x0, x1, 4)) write(label(x), project(x, h1, z0), 0, 16, "center");
-    for (const z of roundNumbers(z0, z1, 5)) write(label(z), project(x1, h0, z), -8, 4, "right");
+    const free = writer(context);
+    const write = (text, [x, y], dx, dy, align) => free(text, x + dx, y + dy, align);
     write(`x (${data.unit})`, project((x0 + x1) / 2, h1, z0), 26, 38, "center");
     write(`z (${data.unit})`, project(x1, h0, z1), -8, -14, "right");
+    for (const x of roundNumbers(x0, x1, 4)) write(label(x), project(x, h1, z0), 0, 16, "center");
+    for (const z of roundNumbers(z0, z1, 5)) write(label(z), project(x1, h0, z), -8, 4, "right");
   }
 
   // Draws the silhouette: the edge between places that are believed to have a surface and the others.
@@ -168,7 +166,10 @@ function reliefView(canvas) {
     const shown = data.planners[planner].contacts.slice(0, frame.touches);
     shown.forEach(([x, h, z], i) => {
       const pair = i < data.initial_touches ? data.colours.initial : data.colours.later;
-      const point = project(x, h === null ? low : Math.min(Math.max(h, low), high), z);
+      const at = (h) => Math.min(Math.max(h, low), high);
+      const path = data.planners[planner].paths[i].map(([x, h, z]) => project(x, at(h), z));
+      if (path.length) return drawStroke(context, path, pair, isHidden, i === shown.length - 1);
+      const point = project(x, h === null ? low : at(h), z);
       const kind = h === null ? "miss" : isHidden(point) ? "hidden" : "seen";
       drawTouch(context, point, pair, kind, i === shown.length - 1);
     });

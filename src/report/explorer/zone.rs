@@ -1,6 +1,9 @@
 //! Interactive view of beliefs over a zone: values on a grid after many touch counts, in few bytes.
 
-use super::{Counts, InteractiveView, LEAST_SHARE, PARTS, counts, encode, encode_log, short};
+use super::{
+    Counts, InteractiveView, LEAST_SHARE, PARTS, STROKES, counts, encode, encode_log, short,
+    thinned,
+};
 use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
 use crate::report::axes::{self, Axis, Length};
@@ -36,11 +39,13 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
         true => ("curve", &[][..], "Drag the slider, or press the arrow keys."),
         false => ("surface", &COLOURS[..], HELP),
     };
+    let is_slid = run.rows.iter().flat_map(|row| &row.touches).any(TouchRow::is_stroke);
     let note = format!(
-        "Trial {}. Blue: the {}; red: those of the planner; the last one is larger.{} \
+        "Trial {}. Blue: the {}; red: those of the planner; the last one is larger.{}{} \
          {help}",
         run.experiment.report.trial,
         counted(run.experiment.initial_touches, "initial touch"),
+        if is_slid { STROKES } else { "" },
         drawn_caption(run)
     );
     Ok(InteractiveView { colours, has_truth: true, class, note, scripts: &SCRIPTS }.html(&data))
@@ -135,6 +140,7 @@ pub fn data(run: &Run, counts: &Counts) -> anyhow::Result<Option<Value>> {
             "name": name,
             "colours": style::light_and_dark(style::planner(&experiment.planners, name)),
             "contacts": contacts.collect::<Vec<_>>(),
+            "paths": touches.iter().map(|touch| path(zone, touch, unit)).collect::<Vec<_>>(),
             "frames": frames.iter().map(|frame| ranges.frame(frame)).collect::<Vec<_>>(),
         })
     };
@@ -205,6 +211,18 @@ impl CodeRanges {
 fn log_range(lengths_m: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let (least, most) = axes::range(lengths_m)?;
     Some([least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most])
+}
+
+/// Returns x, height and z of the points along a stroke, in the unit of the page; empty for a tap.
+fn path(zone: &Zone, touch: &TouchRow, unit: Length) -> Vec<[Option<f64>; 3]> {
+    let slid_w = touch.slid_w().unwrap_or_default();
+    let point = |p_w| {
+        let place = zone.place(p_w);
+        let in_unit = |at_m: f64| short(at_m * unit.per_m);
+        [place.first().copied(), Some(zone.height_m(p_w)), place.get(1).copied()]
+            .map(|at_m| at_m.map(in_unit))
+    };
+    thinned(&slid_w).map(point).collect()
 }
 
 /// Returns x, height and z of a touch, in the unit of the page.

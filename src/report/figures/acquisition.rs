@@ -73,11 +73,13 @@ fn ring(colour: &str) -> String {
 
 const LEFT_PX: f64 = 72.0;
 const TOP_PX: f64 = 66.0;
+/// Room around a panel for its title and the numbers of its axes.
+const ROOM: [f64; 4] = [62.0, 28.0, 16.0, 42.0];
 
 /// Places at which the standard deviation of a curve is computed.
 const STEPS: usize = 300;
 /// Width of a panel, height of a panel of beliefs, height of a panel of standard deviations.
-const CURVE_PX: (f64, f64, f64) = (420.0, 210.0, 130.0);
+const CURVE_PX: (f64, f64, f64) = (360.0, 210.0, 130.0);
 /// Largest height of a panel of beliefs with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 420.0;
 /// Distance between panels, and between a belief and its standard deviation.
@@ -100,7 +102,9 @@ fn draw_curves(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) 
     let mut sheet = FigureLayout::new(size, first, step, width - LEFT_PX, "", entries);
     let colour = style::planner(&run.experiment.planners, planner);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
-        let above = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
+        let below_px = GAPS_PX.1 + CURVE_PX.2 + ROOM[3];
+        let room = [ROOM[0], ROOM[1], ROOM[2], below_px];
+        let above = Panel { area: sheet.panel(column, 0.0, room), ..shape.clone() };
         let top = above.area.bottom() + GAPS_PX.1;
         let area = Area { top, height: CURVE_PX.2, ..above.area };
         let below = Panel { area, x: shape.x.clone(), y: Axis::linear(0.0, largest, 4.0) };
@@ -133,9 +137,10 @@ fn readings(places: Vec<Vec<f64>>, replay: &BeliefReplay) -> Vec<MapValue> {
 }
 
 /// Largest size of a map with equal axes.
-const MAP_PX: (f64, f64) = (400.0, 640.0);
-/// Smallest distance between maps: below them is the label of the colour bar.
-const MAP_STEP_PX: f64 = 330.0;
+const MAP_PX: (f64, f64) = (360.0, 640.0);
+/// Length of the colour bar, and smallest distance between maps.
+const BAR_PX: f64 = 320.0;
+const MAP_STEP_PX: f64 = 280.0;
 
 fn draw_maps(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) -> Option<String> {
     let unit = Length::of(zone);
@@ -150,7 +155,7 @@ fn draw_maps(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) ->
     let shape = Panel::equal(most, Axis::linear(x[0], x[1], 5.0), Axis::linear(z[0], z[1], 6.0));
     let step_px = (shape.area.width + 84.0).max(MAP_STEP_PX);
     let width = LEFT_PX + 2.0 * step_px;
-    let size = [width, shape.area.bottom() + 108.0];
+    let size = [width, shape.area.bottom() + 120.0];
     let (first, step) = (shape.area, [step_px, 0.0]);
     let mut sheet = FigureLayout::new(size, first, step, width - LEFT_PX, "", entries);
     let shape = Panel { area: sheet.area(0, 0.0), ..shape };
@@ -163,7 +168,7 @@ fn draw_maps(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) ->
     let scale = Axis::linear(0.0, largest * unit.per_m, 5.0);
     for (column, (replay, map)) in replays.iter().zip(&maps).enumerate() {
         let area = Area { left: map_area.left + column as f64 * step_px, ..map_area };
-        let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
+        let panel = Panel { area: sheet.panel(column, 0.0, ROOM), ..shape.clone() };
         let canvas = &mut sheet.canvas;
         panel.titled_frame(canvas, &title(planner, replay), &unit.named("x"), &unit.named("z"));
         map.draw(canvas, area, |value| style::deviation(scale.fraction(value * unit.per_m)));
@@ -176,8 +181,8 @@ fn draw_maps(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) ->
             }
         });
     }
-    let top = shape.area.bottom() + 62.0;
-    let bar = Area { left: 0.5 * width - 60.0, top, width: 320.0, height: 13.0 };
+    let top = shape.area.bottom() + 74.0;
+    let bar = Area { left: 0.5 * (width - BAR_PX), top, width: BAR_PX, height: 13.0 };
     let words = unit.named("standard deviation");
     colour_bar(&mut sheet.canvas, bar, &scale, &words, style::deviation);
     Some(sheet.canvas.finish())

@@ -1,7 +1,10 @@
-//! Figure of errors against touches, Fig. 4 of Yi et al. 2016.
+//! Figures of measures against touches, Fig. 4 of Yi et al. 2016: those that decide between planners,
+//! and the others.
 
 use super::ReportFigure;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, PanelAxis, R, ROBOT_TIME};
+use crate::experiment::measure::{
+    Aggregate, MEASURES, Measure, PanelAxis, R, RECOGNISED, RMSE, ROBOT_TIME, VERIFICATION_RMSE,
+};
 use crate::experiment::metrics;
 use crate::experiment::statistics::curve_table;
 use crate::experiment::statistics::summary::{self, CurvePoint};
@@ -15,7 +18,21 @@ use crate::report::tables::summary::finished;
 use palpate_input::format::counted;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "convergence", caption, draw };
+/// Figure of the measures that decide between planners.
+pub(crate) const FIGURE: ReportFigure =
+    ReportFigure { name: "convergence", caption, draw: |run| draw(run, true) };
+
+/// Figure of the other measures.
+pub(crate) const OTHERS: ReportFigure =
+    ReportFigure { name: "measures", caption: others_caption, draw: |run| draw(run, false) };
+
+/// Returns whether a measure decides between planners: the error that ranks them, the
+/// RMSE, that at held-out touches, and the share of recognised objects.
+fn decides(run: &Run, measure: &Measure) -> bool {
+    [run.error_measure(), &RMSE, &VERIFICATION_RMSE, &RECOGNISED]
+        .iter()
+        .any(|it| it.id == measure.id)
+}
 
 /// Returns the score R (Eq. 5) of any positive constant.
 fn constant_r(run: &Run) -> Option<f64> {
@@ -23,6 +40,18 @@ fn constant_r(run: &Run) -> Option<f64> {
 }
 
 fn caption(run: &Run) -> String {
+    format!(
+        "What decides between planners, against the touches and, if the robot moves, its time; \
+         n = {}; all planners share the {}. {BANDS}",
+        finished(run),
+        counted(run.experiment.initial_touches, "initial touch")
+    )
+}
+
+/// Sentence on the bands of a panel.
+const BANDS: &str = "Bands: one standard error of a mean, 95 % bootstrap interval of a median.";
+
+fn others_caption(run: &Run) -> String {
     let score = constant_r(run).map_or(String::new(), |score| {
         format!(
             " R is not centred: any positive constant scores {score:.3} here (dashed), so the centred \
@@ -30,19 +59,19 @@ fn caption(run: &Run) -> String {
         )
     });
     format!(
-        "Accuracy of the belief against the number of touches, and its error against the robot's time; n = {}; all planners share \
-         the {}. Bands: one standard error of a mean, 95 % bootstrap \
-         interval of a median.{score}{}",
-        finished(run),
-        counted(run.experiment.initial_touches, "initial touch"),
+        "Other measures of the belief against the number of touches. {BANDS}{score}{}",
         in_paper(run, "Fig. 4")
     )
 }
 
-const MARGIN_PX: f64 = 16.0;
-const LEFT_PX: f64 = 70.0;
-const PANEL: (f64, f64) = (446.0, 262.0);
-const GAP: (f64, f64) = (96.0, 78.0);
+/// Room around a panel for its title and the numbers of its axes.
+const ROOM: [f64; 4] = [64.0, 28.0, 16.0, 44.0];
+/// Size and number in a row of the panels of the measures that decide, and of the others.
+// heuristic: a panel with its numbers is as wide as a phone.
+const PANELS: [([f64; 2], usize); 2] = [([344.0, 250.0], 2), ([274.0, 190.0], 3)];
+
+/// Height of the legend.
+const LEGEND_PX: f64 = 38.0;
 
 /// Colour and curve of a planner.
 type Curve = (&'static str, Vec<CurvePoint>);
@@ -50,13 +79,14 @@ type Curve = (&'static str, Vec<CurvePoint>);
 /// Measure after some touches, in its display unit: (touches, value, dotted value, band).
 type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
 
-fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    if !run.truth.is_known() && run.experiment.scene.whole_object.is_none() {
+fn draw(run: &Run, is_first: bool) -> anyhow::Result<Option<String>> {
+    let scene = &run.experiment.scene;
+    if !run.truth.is_known() && scene.whole_object.is_none() && scene.library.is_none() {
         return Ok(None);
     }
     let curves = curves(run);
     let points = || curves.iter().flat_map(|(_, points)| points);
-    let shown: Vec<&Measure> = MEASURES
+    let mut shown: Vec<&Measure> = MEASURES
         .iter()
         .filter(|measure| match measure.scale {
             PanelAxis::Undrawn => false,
@@ -64,7 +94,10 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             PanelAxis::Linear | PanelAxis::UpToOne | PanelAxis::Log => true,
         })
         .filter(|measure| points().any(|point| point.of(measure).is_some()))
+        .filter(|measure| decides(run, measure) == is_first)
         .collect();
+    let first = if scene.library.is_some() { &RECOGNISED } else { run.error_measure() };
+    shown.sort_by_key(|measure| measure.id != first.id);
     let over_touches = shown.iter().map(|measure| (*measure, false));
     let is_over_time =
         |measure: &&&Measure| measure.is_error && measure.aggregate == Aggregate::Both;
@@ -73,8 +106,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let over_time = shown.iter().filter(|_| times.is_some()).filter(is_over_time);
     let panels: Vec<(&Measure, bool)> =
         over_touches.chain(over_time.map(|measure| (*measure, true))).collect();
-    let dashed = constant_r(run).map(|_| (Swatch::Line(constant_line()), "R of any constant"));
-    Ok(draw_panels(run, &curves, 2, &panels, times.as_ref(), dashed))
+    let is_r = shown.iter().any(|measure| measure.id == R.id);
+    let dashed = constant_r(run)
+        .filter(|_| is_r)
+        .map(|_| (Swatch::Line(constant_line()), "R of any constant"));
+    let panel = PANELS[usize::from(!is_first)];
+    Ok(draw_panels(run, &curves, panel, &panels, times.as_ref(), dashed))
 }
 
 /// Draws the error of the planners over touches alone; `None` without an error.
@@ -82,7 +119,7 @@ pub fn draw_error(run: &Run) -> Option<String> {
     let (curves, error) = (curves(run), run.error_measure());
     let mut points = curves.iter().flat_map(|(_, points)| points);
     points.any(|point| point.of(error).is_some()).then_some(())?;
-    draw_panels(run, &curves, 1, &[(error, false)], None, None)
+    draw_panels(run, &curves, PANELS[0], &[(error, false)], None, None)
 }
 
 fn curves(run: &Run) -> Vec<Curve> {
@@ -94,32 +131,34 @@ fn curves(run: &Run) -> Vec<Curve> {
         .collect()
 }
 
-/// Draws panels of measures, each over touches or over `times`, in columns; `None` without a touch.
+/// Draws panels of measures, each over touches or over `times`; `panel` is the size of one and the
+/// largest number in a row. Returns `None` without a touch or a panel.
 fn draw_panels(
     run: &Run,
     curves: &[Curve],
-    columns: usize,
+    panel: ([f64; 2], usize),
     panels: &[(&Measure, bool)],
     times: Option<&Axis>,
     more: Option<(Swatch, &str)>,
 ) -> Option<String> {
     let points = curves.iter().flat_map(|(_, points)| points);
-    let first = points.map(|point| point.touches).min()?;
+    let first = points.map(|point| point.touches).min().filter(|_| !panels.is_empty())?;
     let x = Axis::counts(first.into(), run.experiment.touches.into(), 6.0);
     let swatches = curves
         .iter()
         .zip(&run.experiment.planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
-    let step = [PANEL.0 + GAP.0, PANEL.1 + GAP.1];
-    let width = columns as f64 * step[0] + MARGIN_PX;
+    let ([width, height], columns) = panel;
+    let columns = columns.min(panels.len());
+    let step = [ROOM[0] + width + ROOM[2], ROOM[1] + height + ROOM[3]];
+    let legend_px = columns as f64 * step[0];
     let rows = panels.len().div_ceil(columns) as f64;
-    let size = [width, 66.0 - 12.0 + rows * step[1]];
-    let legend_px = width - 2.0 * LEFT_PX;
-    let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
+    let first = Area { left: ROOM[0], top: LEGEND_PX + ROOM[1], width, height };
+    let size = [legend_px, LEGEND_PX + rows * step[1]];
     let entries = swatches.chain(more);
-    let mut sheet = FigureLayout::new(size, first, step, legend_px, "", entries);
+    let mut sheet = FigureLayout::new(size, first, step, legend_px - ROOM[0], "", entries);
     for (i, (measure, over_time)) in panels.iter().enumerate() {
-        let area = sheet.area(i % columns, (i / columns) as f64);
+        let area = sheet.panel(i % columns, (i / columns) as f64, ROOM);
         let time_axis = times.filter(|_| *over_time);
         draw_measure(&mut sheet.canvas, area, run, measure, &x, time_axis, curves);
     }

@@ -31,6 +31,8 @@ const PANEL: (f64, f64) = (236.0, 188.0);
 /// Largest height of a panel with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 340.0;
 const GAP: (f64, f64) = (22.0, 68.0);
+/// Room around a panel for its title and the numbers of its axes.
+const ROOM: [f64; 4] = [62.0, 40.0, 16.0, 42.0];
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
@@ -48,7 +50,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let mut sheet = FigureLayout::new(size, shape.area, step, legend_px, "", entries(run, []));
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
-            let area = sheet.area(column, row as f64);
+            let area = sheet.panel(column, row as f64, ROOM);
             let panel = Panel { area, ..shape.clone() };
             let canvas = &mut sheet.canvas;
             let replay = BeliefReplay::new(run, planner, count)?;

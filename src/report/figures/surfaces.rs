@@ -5,7 +5,7 @@ use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{FigureLayout, miss_entry, seen_entry, touch_entries};
+use crate::report::legend::{FigureLayout, miss_entry, seen_entry, stroke_entry, touch_entries};
 use crate::report::relief::{
     ON_RELIEF, Relief, ReliefPanel, Space, height_colour, unreachable_colour,
 };
@@ -42,8 +42,8 @@ fn caption(run: &Run) -> String {
 pub const PLACES: usize = 41;
 const MARGIN: (f64, f64) = (24.0, 44.0);
 const PANEL: (f64, f64) = (252.0, 316.0);
-const FOOT_PX: f64 = 62.0;
-const BAR_LEFT_MIN_PX: f64 = 215.0;
+const FOOT_PX: f64 = 78.0;
+const BAR_PX: f64 = 320.0;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
@@ -57,7 +57,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let unit = Length::of(zone);
     let (width, rows) = ((counts.len() as f64 + 1.0) * PANEL.0, planners.len() as f64);
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX];
+    let slides = run.rows.iter().flat_map(|row| &row.touches).any(TouchRow::is_stroke);
     let entries = touch_entries().into_iter().chain(miss_entry(run)).chain(seen_entry(run));
+    let entries = entries.chain(slides.then(stroke_entry));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
     let mut sheet = FigureLayout::new(size, first, PANEL.into(), width, ON_RELIEF, entries);
     let [low, high] = space.height_m;
@@ -77,7 +79,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         };
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
-            let panel = ReliefPanel::new(unit, sheet.area(column, row as f64), space);
+            let panel = ReliefPanel::new(unit, sheet.panel(column, row as f64, [0.0; 4]), space);
             let canvas = &mut sheet.canvas;
             let replay = BeliefReplay::new(run, planner, count)?;
             let score = replay.as_ref().map_or(NO_BELIEF.into(), BeliefReplay::score);
@@ -99,15 +101,14 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         }
     }
     if run.truth.is_known() {
-        let area = sheet.area(counts.len(), 0.5 * (rows - 1.0));
+        let area = sheet.panel(counts.len(), 0.5 * (rows - 1.0), [0.0; 4]);
         let panel = ReliefPanel::new(unit, area, space);
         panel.frame(&mut sheet.canvas, "true object", "");
         let heights = grid.places.iter().map(|(_, height_m)| *height_m);
         relief(&mut sheet.canvas, &panel, heights.collect(), &grid.is_reachable);
     }
-    // The label is on the left; its width depends on the browser's font.
-    let left = (0.5 * width - 60.0).max(BAR_LEFT_MIN_PX);
-    let bar = Area { left, top: sheet.bottom - FOOT_PX + 14.0, width: 320.0, height: 13.0 };
+    let left = MARGIN.0 + 0.5 * (width - BAR_PX);
+    let bar = Area { left, top: sheet.bottom - FOOT_PX + 30.0, width: BAR_PX, height: 13.0 };
     height_bar(&mut sheet.canvas, bar, unit, space.height_m);
     Ok(Some(sheet.canvas.finish()))
 }
@@ -146,7 +147,15 @@ pub fn mark<'a>(
     relief: &Relief,
     marks: impl Iterator<Item = (&'a TouchRow, &'static str)>,
 ) {
+    let at = |p_w: &Point3<f64>| match zone.place(p_w)[..] {
+        [x, z] => Vector3::new(x, zone.height_m(p_w), z),
+        _ => Vector3::repeat(f64::NAN),
+    };
     for (touch, colour) in marks {
+        if let Some(slid_w) = touch.slid_w() {
+            relief.stroke(canvas, &panel.camera, slid_w.iter().map(at), colour);
+            continue;
+        }
         match replay::contact(zone, touch) {
             Some((place, height)) => {
                 let point = Vector3::new(place[0], height, place[1]);

@@ -33,6 +33,8 @@ fn caption(run: &Run) -> String {
 const PANEL_PX: (f64, f64) = (300.0, 380.0);
 const LEFT_PX: f64 = 66.0;
 const TOP_PX: f64 = 66.0;
+/// Room around a panel for its title and the numbers of its axes.
+const ROOM: [f64; 4] = [62.0, 28.0, 16.0, 42.0];
 /// Smallest width, for the labels of a legend.
 const WIDTH_MIN_PX: f64 = 420.0;
 /// Margin around the zone as a fraction of its side, because contacts may lie outside.
@@ -57,8 +59,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         (Swatch::Circle(dot(INITIAL)), "contact of an initial touch"),
         (Swatch::Circle(dot(PLANNED)), "contact of a later touch"),
     ];
-    let slides = |touch: &TouchRow| touch.target.slide_m() > 0.0;
-    if rows.iter().flat_map(|row| &row.touches).any(slides) {
+    if rows.iter().flat_map(|row| &row.touches).any(TouchRow::is_stroke) {
         entries.push(stroke_entry());
     }
     entries.extend(miss_entry(run));
@@ -70,7 +71,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let (first, step) = (shape.area, [step_px, 0.0]);
     let mut sheet = FigureLayout::new(size, first, step, width - LEFT_PX, "", entries);
     for (column, row) in rows.iter().enumerate() {
-        let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
+        let panel = Panel { area: sheet.panel(column, 0.0, ROOM), ..shape.clone() };
         let canvas = &mut sheet.canvas;
         let z = if column == 0 { unit.named("z") } else { String::new() };
         panel.titled_frame(canvas, &row.planner, &unit.named("x"), &z);

@@ -9,11 +9,12 @@ mod section;
 
 pub use figure::{FilmPanels, figure};
 pub use reach::picture;
-pub use section::{COLOURS, SCRIPTS, counts, data, deviation_axis, section};
+pub use section::{COLOURS, OBJECT_COLOURS, SCRIPTS, counts, data, deviation_axis, section};
 
 use crate::report::points::PointCloud;
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
+use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::solids::{Triangles, normals};
 
 /// Touches of a planner with its beliefs after some of them.
@@ -27,8 +28,15 @@ pub struct PlannerSurfaces {
     pub frames: Vec<SurfaceFrame>,
 }
 
+impl PlannerSurfaces {
+    /// Returns whether the surfaces are recognised objects.
+    pub fn has_objects(&self) -> bool {
+        self.frames.iter().any(|frame| !frame.hypotheses.is_empty())
+    }
+}
+
 /// Touch of a whole object.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct SolidTouch {
     /// Target point.
     pub aim_w: Point3<f64>,
@@ -36,6 +44,8 @@ pub struct SolidTouch {
     pub along_w: Vector3<f64>,
     /// Contact point; `None` for a miss or an aborted touch.
     pub contact_w: Option<Point3<f64>>,
+    /// Points along a stroke, from its begin to its end; empty for a tap.
+    pub path_w: Vec<Point3<f64>>,
     /// Whether it is one of the initial touches, which all planners share.
     pub is_initial: bool,
 }
@@ -58,8 +68,9 @@ pub struct SurfaceFrame {
     pub score: String,
     /// Points that cameras have seen, in `W`.
     pub seen_w: Vec<Point3<f64>>,
-    /// Points along each stroke, in `W`.
-    pub slid_w: Vec<Vec<Point3<f64>>>,
+    /// Hypotheses about the object with their probabilities, the likeliest first. If there are any,
+    /// the mesh is a recognised object, without standard deviations.
+    pub hypotheses: Vec<(String, f64)>,
 }
 
 impl SurfaceFrame {
@@ -80,4 +91,10 @@ impl SurfaceFrame {
             triangles: triangles.iter().map(|corners| corners.map(|i| i as usize)).collect(),
         }
     }
+}
+
+/// Returns the distance of a point from a closed surface, m, negative inside.
+pub fn error_m(bvh: &MeshBvh, p_w: &Point3<f64>) -> f64 {
+    let distance_m = bvh.closest_point(p_w).distance_m;
+    if bvh.is_enclosed(p_w) { -distance_m } else { distance_m }
 }

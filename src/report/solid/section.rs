@@ -4,7 +4,7 @@
 use super::{PlannerSurfaces, SolidTouch, SurfaceFrame};
 use crate::report::axes::{self, Axis, Length, MM};
 use crate::report::explorer::{
-    self, InteractiveView, LEAST_SHARE, PARTS, encode, encode_log, short,
+    self, InteractiveView, LEAST_SHARE, PARTS, STROKES, encode, encode_log, short, thinned,
 };
 use crate::report::style;
 use anyhow::ensure;
@@ -29,6 +29,9 @@ pub(super) const TRUTH_TRIANGLES: usize = 8000;
 /// Colour maps of a surface: names in scripts, and labels.
 pub const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
 
+/// Colour maps of a recognised object.
+pub const OBJECT_COLOURS: [(&str, &str); 2] = [("plain", "none"), ("error", "error")];
+
 /// Returns the touch counts whose beliefs are drawn: as many as fit on a page, including the first
 /// and the last, if the surfaces of `planners` planners have about `triangles` triangles each.
 pub fn counts(first: u32, last: u32, planners: usize, triangles: usize) -> Vec<u32> {
@@ -51,17 +54,27 @@ pub fn section(
     let truth = truth.map(|mesh| decimate(mesh, TRUTH_TRIANGLES));
     let Some(data) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
     let initial = first.touches.iter().filter(|touch| touch.is_initial).count();
+    let is_object = shown.iter().any(|sequence| sequence.has_objects());
+    let (colours, what) = match is_object {
+        true => (
+            &OBJECT_COLOURS,
+            " The likeliest object is at its estimated pose; bars: probabilities of the objects.",
+        ),
+        false => (&COLOURS, ""),
+    };
     let green = match truth {
         Some(_) => " Green: the true surface in front of the belief.",
         None => "",
     };
+    let is_slid = shown.iter().flat_map(|it| &it.touches).any(|touch| !touch.path_w.is_empty());
+    let strokes = if is_slid { STROKES } else { "" };
     let shell = InteractiveView {
-        colours: if data["error_range"].is_null() { &COLOURS[..1] } else { &COLOURS },
+        colours: if data["error_range"].is_null() { &colours[..1] } else { colours },
         has_truth: truth.is_some(),
         class: "surface",
         note: format!(
-            "Trial {trial}. Blue: the {}; red: those of the planner; the last one is larger, with an \
-             arrow along the approach.{green} {HELP}",
+            "Trial {trial}.{what} Blue: the {}; red: those of the planner; the last one is larger, \
+             with an arrow along the approach.{strokes}{green} {HELP}",
             counted(initial, "initial touch")
         ),
         scripts: &SCRIPTS,
@@ -166,6 +179,7 @@ fn coded<'a>(
         "corners": mesh.corners,
         "touches": frame.touches,
         "score": frame.score,
+        "hypotheses": frame.hypotheses,
         "deviation": encode_log(deviations, ordered(&frame.sd_m)),
         "error": error,
     }))
@@ -178,6 +192,7 @@ fn marked(touch: &SolidTouch, cube: Cube) -> Value {
         "aim": from_middle(touch.aim_w),
         "along": <[f64; 3]>::from(touch.along_w).map(short),
         "contact": touch.contact_w.map(from_middle),
+        "path": thinned(&touch.path_w).map(|p_w| from_middle(*p_w)).collect::<Vec<_>>(),
         "is_initial": touch.is_initial,
     })
 }

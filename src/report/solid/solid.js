@@ -21,7 +21,7 @@ function viewOf(canvas) {
   const LIGHT = axes(FIRST).map((row) => dot(row, unitVector(SHADING.light)));
   // Opacity of the true surface in front of the belief, and the least distance for it, relative to
   // the size.
-  const [OPACITY, LIFT] = [0.62, 0.004];
+  const [OPACITY, LIFT, VEIL] = [0.62, 0.004, 0.4];
   const FOOT = 74;
   let known, truth, truthTints, scales;
   const paintAll = painter(() => window.draw());
@@ -38,6 +38,7 @@ function viewOf(canvas) {
     truth = data.truth && meshOf(data.truth);
     truthTints = truth && Uint8Array.from(truth.positions, (_, i) => data.colours.truth[i % 3]);
     scales = {
+      plain: { stops: data.colours.height, at: () => 0.6, ticks: [] },
       deviation: deviationScale(data.deviation_range),
       error: data.error_range && errorScale(data.error_range[1], "error: inside the true surface | outside"),
     };
@@ -81,7 +82,9 @@ function viewOf(canvas) {
       shift: [2 * middle[0] / width - 1, 1 - 2 * middle[1] / height, 0],
       light: LIGHT, ambient: SHADING.ambient,
     };
-    const over = isTruthShown && { mesh: truth, tints: truthTints, opacity: OPACITY, lift: 0.4 * LIFT };
+    // The true object is a veil over the whole of a recognised one.
+    const [opacity, lift] = frame.hypotheses.length ? [VEIL, -0.5] : [OPACITY, 0.4 * LIFT];
+    const over = isTruthShown && { mesh: truth, tints: truthTints, opacity, lift };
     return paintAll(view, { mesh: frame.mesh, tints }, over);
   }
 
@@ -174,7 +177,7 @@ function viewOf(canvas) {
     take();
     const { context, width, height, ratio } = pen(canvas);
     const frame = frameOf(state);
-    const values = frame[state.colour] ?? new Float32Array(frame.deviation.length).fill(NaN);
+    const values = frame[state.colour] ?? frame.deviation.map(() => NaN);
     const eye = camera(width, height);
     const isHidden = hider(frame.mesh, eye.at);
     // At any zoom, the colour bar below stays visible.
@@ -190,6 +193,7 @@ function viewOf(canvas) {
       const isLast = i === shown.length - 1;
       const point = eye.at(touch.contact ?? touch.aim);
       if (isLast) drawArrow(context, touch, eye.at, isHidden, onPaper(pair));
+      if (touch.path.length) return drawStroke(context, touch.path.map(eye.at), pair, isHidden, isLast);
       const kind = touch.contact === null ? "miss" : isHidden(point) ? "hidden" : "seen";
       drawTouch(context, point, pair, kind, isLast);
     });

@@ -22,7 +22,7 @@ pub fn table(run: &Run) -> Table {
 
 /// Returns the rows of [`table`] after `counts` touches.
 pub fn table_after(run: &Run, counts: &[u32]) -> Table {
-    let aggregates: Vec<(&Measure, bool)> = (MEASURES.iter())
+    let mut aggregates: Vec<(&Measure, bool)> = (MEASURES.iter())
         .filter(|measure| measure.in_tables)
         .flat_map(|measure| [(measure, false), (measure, true)])
         .filter(|(measure, is_median)| match is_median {
@@ -30,6 +30,8 @@ pub fn table_after(run: &Run, counts: &[u32]) -> Table {
             false => measure.aggregate.has_mean(),
         })
         .collect();
+    // The error that ranks the planners is the first.
+    aggregates.sort_by_key(|(measure, _)| measure.id != run.error_measure().id);
     let column = |(measure, is_median): &(&Measure, bool)| {
         let kind = if *is_median { "median" } else { "mean" };
         Column::new(format!("{kind} {}", measure.stem().replace('_', " ")))

@@ -79,7 +79,7 @@ fn frame(touches: &[SolidTouch], most: usize, cell_m: f64) -> SurfaceFrame {
         error_m: mesh.0.iter().map(ring_m).collect(),
         mesh,
         seen_w: Vec::new(),
-        slid_w: Vec::new(),
+        hypotheses: Vec::new(),
         score: format!("Chamfer {:.1} mm", 10.0 * (1.0 - share)),
     }
 }
@@ -100,6 +100,7 @@ pub fn sequence(planner: &str, most: usize, cell_m: f64) -> PlannerSurfaces {
                 aim_w,
                 along_w: -out,
                 contact_w: (i % 7 != 6).then_some(aim_w),
+                path_w: Vec::new(),
                 is_initial: i < 5,
             }
         })

@@ -39,6 +39,9 @@ pub struct RecognitionMetrics {
 /// Pose of an object's mesh in `W`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PoseRow {
+    /// Name of the object.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub object: String,
     /// Position of the mesh's origin, m.
     pub position_m: [f64; 3],
     /// Rotation about the fixed axes x, then y, then z, deg.
@@ -53,6 +56,10 @@ pub struct PoseRow {
 pub struct RecognitionError {
     /// Name of the true object.
     pub object: String,
+    /// Position of the origin of its mesh, m, and rotation about the fixed axes x, then y, then z,
+    /// deg.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<[[f64; 3]; 2]>,
     /// Right hypothesis: its name or class; `none` for an unknown object.
     pub hypothesis: String,
     /// Probability of the right hypothesis.
@@ -87,6 +94,7 @@ impl RecognitionMetrics {
             let between = truth.x_wo.inv_mul(&estimate.x_wo);
             RecognitionError {
                 object: truth.name.clone(),
+                pose: Some(parts(&truth.x_wm).into()),
                 hypothesis: name(right),
                 probability: probabilities.get(right).copied().unwrap_or(0.0),
                 distance_m: is_found
@@ -102,7 +110,12 @@ impl RecognitionMetrics {
             object: name(best),
             probabilities: listed.map(|(i, it)| (name(i), *it)).collect(),
             predictive_nats: hypotheses.predictive_nats(),
-            pose: PoseRow { position_m, rotation_deg, distance_95_m: estimate.distance_95_m },
+            pose: PoseRow {
+                object: object.name.clone(),
+                position_m,
+                rotation_deg,
+                distance_95_m: estimate.distance_95_m,
+            },
             error,
         }
     }
