@@ -176,6 +176,7 @@ fn solid(belief: &ImplicitSurface) -> Option<String> {
             aim_w: *p_w,
             along_w: centre_w - p_w,
             contact_w: Some(*p_w),
+            path_w: Vec::new(),
             is_initial: false,
         })
         .collect();
@@ -196,7 +197,9 @@ fn solid(belief: &ImplicitSurface) -> Option<String> {
     let top = SOLID_PX.1 + 8.0;
     panels.draw(&mut canvas, &sequence.frames[0], [20.0, top]);
     let bar = Area { left: 20.0 + SOLID_PX.0, top, width: SOLID_PX.0 - 40.0, height: 13.0 };
-    colour_bar(&mut canvas, bar, panels.axis(), "standard deviation (mm)", style::deviation);
+    if let Some(axis) = panels.axis() {
+        colour_bar(&mut canvas, bar, axis, "standard deviation (mm)", style::deviation);
+    }
     Some(canvas.finish())
 }
 
