@@ -117,8 +117,8 @@ enum Command {
     Register(register::Args),
     /// Fit the finger's constants to recordings on a flat plate, or the 95 % band to objects.
     Calibrate(calibrate::Args),
-    /// List experiments, scenes, planners, measures, effects and files; copy shipped files; print the
-    /// reference.
+    /// List experiments, scenes, planners, measures, effects and files; copy shipped files; print
+    /// the reference.
     List(list::Args),
     /// Print the state of MuJoCo, display, ROS, clock and files, with remedies.
     Doctor(doctor::Args),

@@ -166,7 +166,7 @@ fn a_quick_benchmark_runs_and_continues() {
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let (json, table) = (read("benchmark.json"), read("benchmark.md"));
     let result: Value = serde_json::from_str(&json).unwrap();
-    assert_eq!(result["protocol"], "3");
+    assert_eq!(result["protocol"], PROTOCOL);
     assert_eq!(result["protocol_sha256"], SHA256);
     assert_eq!(result["quick"], true);
     assert_eq!(result["budgets"], serde_json::json!([10, 15]));

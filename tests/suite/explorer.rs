@@ -114,7 +114,8 @@ context.arc = function (x, y, radius, ...rest) {
   arc.call(this, x, y, radius, ...rest);
 };
 context.stroke = function (...rest) {
-  if (this.lineWidth === 2 || this.lineWidth === 3.6) window.drawn.lines++;
+  // A context keeps its numbers in single precision.
+  if ([2, Math.fround(3.6)].includes(this.lineWidth)) window.drawn.lines++;
   stroke.apply(this, rest);
 };
 </script>"#;

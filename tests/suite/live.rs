@@ -122,14 +122,14 @@ fn a_person_is_a_planner() {
     let page = Page::of(TOY, &sets);
     page.viewer.order(&json!({ "order": "go" }));
     let touch = |x: f64| json!({ "order": "touch", "planner": "human", "target": [x] });
-    for (x, count) in [(0.25, 2), (-1.5, 3)] {
+    for (x, count) in [(0.0025, 2), (-0.015, 3)] {
         page.viewer.when(|state| {
             statuses(state).first() == Some(&"your_turn") && touches(state)[0] == count
         });
         for (wrong, words) in [
             (json!({ "order": "touch", "planner": "human", "target": [17.0] }), "inside the zone"),
             (json!({ "order": "touch", "planner": "human", "target": [] }), "inside the zone"),
-            (json!({ "order": "touch", "planner": "humen", "target": [0.1] }), "human, random"),
+            (json!({ "order": "touch", "planner": "humen", "target": [0.001] }), "human, random"),
             (json!({ "order": "confirm", "planner": "human" }), "does not wait for an approval"),
             (json!({ "order": "speed", "times": -1.0 }), "0.01 to 1000"),
             (json!({ "order": "explode" }), "allowed is hold"),
@@ -143,7 +143,7 @@ fn a_person_is_a_planner() {
     let run = page.ended();
     let row = run.rows.iter().find(|row| row.planner == "human").unwrap();
     let chosen: Vec<f64> = row.touches[2..].iter().map(|it| it.target.numbers()[0]).collect();
-    assert_eq!(chosen, [0.25, -1.5]);
+    assert_eq!(chosen, [0.0025, -0.015]);
     assert!(row.failure.is_none());
 }
 
@@ -160,7 +160,7 @@ fn a_touch_needs_its_approval() {
     page.viewer.when(asks(0));
     page.viewer.order(&json!({ "order": "confirm", "planner": "active" }));
     page.viewer.when(asks(1));
-    page.viewer.order(&json!({ "order": "touch", "planner": "active", "target": [0.5] }));
+    page.viewer.order(&json!({ "order": "touch", "planner": "active", "target": [0.005] }));
     page.viewer.when(asks(2));
     page.viewer.order(&json!({ "order": "stop" }));
     let state = page.viewer.when(|state| statuses(state) == ["failed"]);

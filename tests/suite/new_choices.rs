@@ -149,8 +149,7 @@ fn a_unit_is_taken_with_its_evidence_or_named_as_a_guess() {
     write(&folder, "bracket.obj", obj("", &bracket, |p| p));
     for arguments in [&["bracket.obj"][..], &["bracket.obj", "--yes"]] {
         let said = new(&folder, arguments);
-        for part in ["note: the unit is a guess", "as cm 50 mm, as mm 5 mm", "--unit mm", "--up z"]
-        {
+        for part in ["note: the unit is a guess", "as cm 50 mm, as mm 5 mm", "--unit mm"] {
             assert!(said.contains(part), "no {part:?} in {said}");
         }
         assert_eq!(scene(&folder, "bracket").object.unwrap().unit, Unit::Cm);

@@ -266,8 +266,8 @@ fn a_run_shows_how_hypotheses_fade() {
     let output = run_to_end(&mut command, "run lookalikes");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let figure = fs::read_to_string(folder.path().join("it/figures/hypotheses.svg")).unwrap();
-    assert!(figure.contains("box-wider") && figure.contains("most likely object"), "{figure}");
-    // The true object is `box-higher`; `box` has another name, and another colour.
+    assert!(figure.contains("box-wider") && figure.contains("recognised object"), "{figure}");
+    // Among the probabilities the true object, `box-higher`, has another colour.
     let is_true = |line: &&str| line.contains("</text>") && line.contains("#009e73");
     let true_names: Vec<&str> = figure.lines().filter(is_true).collect();
     assert!(true_names.len() == 1 && true_names[0].contains(">box-higher<"), "{true_names:?}");

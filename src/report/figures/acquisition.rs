@@ -79,7 +79,7 @@ const ROOM: [f64; 4] = [62.0, 28.0, 16.0, 42.0];
 /// Places at which the standard deviation of a curve is computed.
 const STEPS: usize = 300;
 /// Width of a panel, height of a panel of beliefs, height of a panel of standard deviations.
-const CURVE_PX: (f64, f64, f64) = (360.0, 210.0, 130.0);
+const CURVE_PX: (f64, f64, f64) = (340.0, 210.0, 130.0);
 /// Largest height of a panel of beliefs with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 420.0;
 /// Distance between panels, and between a belief and its standard deviation.
@@ -137,7 +137,7 @@ fn readings(places: Vec<Vec<f64>>, replay: &BeliefReplay) -> Vec<MapValue> {
 }
 
 /// Largest size of a map with equal axes.
-const MAP_PX: (f64, f64) = (360.0, 640.0);
+const MAP_PX: (f64, f64) = (340.0, 640.0);
 /// Length of the colour bar, and smallest distance between maps.
 const BAR_PX: f64 = 320.0;
 const MAP_STEP_PX: f64 = 280.0;

@@ -1,5 +1,5 @@
-//! Figures of measures against touches, Fig. 4 of Yi et al. 2016: those that decide between planners,
-//! and the others.
+//! Figures of measures against touches, Fig. 4 of Yi et al. 2016: those that decide between
+//! planners, and the others.
 
 use super::ReportFigure;
 use crate::experiment::measure::{
@@ -68,7 +68,7 @@ fn others_caption(run: &Run) -> String {
 const ROOM: [f64; 4] = [64.0, 28.0, 16.0, 44.0];
 /// Size and number in a row of the panels of the measures that decide, and of the others.
 // heuristic: a panel with its numbers is as wide as a phone.
-const PANELS: [([f64; 2], usize); 2] = [([344.0, 250.0], 2), ([274.0, 190.0], 3)];
+const PANELS: [([f64; 2], usize); 2] = [([332.0, 242.0], 2), ([274.0, 190.0], 3)];
 
 /// Height of the legend.
 const LEGEND_PX: f64 = 38.0;
