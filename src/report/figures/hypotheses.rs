@@ -1,5 +1,5 @@
-//! Figure of the hypotheses about the object: how their probabilities change in one trial, and which
-//! objects are recognised as which in all trials.
+//! Figure of the hypotheses about the object: how their probabilities change in one trial, and
+//! which objects are recognised as which in all trials.
 
 use super::ReportFigure;
 use crate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
