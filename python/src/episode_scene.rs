@@ -86,8 +86,8 @@ pub(crate) struct EpisodeScene {
 }
 
 impl EpisodeScene {
-    /// Prepares a scene; `belief` are `--set` assignments of the table `[gp]`, `grid` and `has_truth`
-    /// as in [`ExplorationScene::new`].
+    /// Prepares a scene; `belief` are `--set` assignments of the table `[gp]`, `grid` and
+    /// `has_truth` as in [`ExplorationScene::new`].
     ///
     /// # Errors
     /// `ConfigError`, `SimulationError`, `ValueError`, also for the ends of the drawn settings.

@@ -36,7 +36,8 @@ const CELLS: u32 = 64;
 
 #[pymethods]
 impl Exploration {
-    /// Creates an exploration; `settings` are those of the belief, as in gp={"kernel": "matern_32"}.
+    /// Creates an exploration; `settings` are those of the belief, as in gp={"kernel":
+    /// "matern_32"}.
     #[new]
     #[pyo3(signature = (scene, **settings))]
     fn new(

@@ -238,8 +238,8 @@ pub(crate) fn compare(
     found.map(|found| found.to_string()).map_err(|error: InputError| errors::other(error))
 }
 
-/// Returns the error of each planner over all objects, relative to the reference, with its interval,
-/// and the share of the gap from random to the oracle that it closes.
+/// Returns the error of each planner over all objects, relative to the reference, with its
+/// interval, and the share of the gap from random to the oracle that it closes.
 fn over_all_objects(compared: &SuiteComparison) -> Vec<Value> {
     let objects: Vec<usize> = (0..compared.objects.len()).collect();
     let row = |it: &Entrant| {

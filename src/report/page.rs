@@ -26,9 +26,9 @@ const RAW: &[(&str, &str)] = &[
 /// Largest number of failures listed one by one; the others are only counted.
 const FAILURES_LISTED: usize = 10;
 
-/// Returns the page as HTML: final errors, verdict, error curves and interactive view, then everything else
-/// folded. `explorer` is the interactive view; `settings` and `manifest` are the texts of the files
-/// of that name, if they exist.
+/// Returns the page as HTML: final errors, verdict, error curves and interactive view, then
+/// everything else folded. `explorer` is the interactive view; `settings` and `manifest` are the
+/// texts of the files of that name, if they exist.
 pub fn html(
     run: &Run,
     analysis: &Analysis,

@@ -109,8 +109,8 @@ fn a_bad_page_is_found() {
     }
 }
 
-/// Pages of a curve, a surface, a whole object, recognised objects, strokes, a run in which each trial of a planner fails, and a
-/// comparison.
+/// Pages of a curve, a surface, a whole object, recognised objects, strokes, a run in which each
+/// trial of a planner fails, and a comparison.
 #[test]
 #[ignore = "needs axe-core: make test PART=page"]
 fn report_pages_are_accessible() {

@@ -1,5 +1,5 @@
-//! Tests of the interactive views of the page: strokes are lines, and recognised objects are at their
-//! estimated poses.
+//! Tests of the interactive views of the page: strokes are lines, and recognised objects are at
+//! their estimated poses.
 
 use crate::common::runs::{SURFACE, run};
 use crate::common::solids::sequence;

@@ -247,8 +247,8 @@ const SHAPE_CONTRAST: f64 = 3.0;
 const FIGURE_WORDS_PX: f64 = 9.0;
 
 /// At every width, on light and dark backgrounds: the page does not scroll sideways; tables scroll
-/// in their boxes, with a cue and a fixed first column, and panels are in one column on a phone; all
-/// text is readable, and none is printed over another.
+/// in their boxes, with a cue and a fixed first column, and panels are in one column on a phone;
+/// all text is readable, and none is printed over another.
 #[test]
 fn the_page_fits_every_width_on_light_and_dark_paper() {
     let Some(browser) = browser_or_note() else { return };

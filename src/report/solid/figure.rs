@@ -170,8 +170,8 @@ fn belief(
     draw_frame(view, canvas, sequence, frame, axis, truth);
 }
 
-/// Draws a surface, coloured by its standard deviation along `axis`, or a recognised object over the
-/// true one, and its touches.
+/// Draws a surface, coloured by its standard deviation along `axis`, or a recognised object over
+/// the true one, and its touches.
 fn draw_frame(
     view: &View,
     canvas: &mut Canvas,

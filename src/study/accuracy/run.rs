@@ -233,8 +233,8 @@ impl AccuracyResult {
 type Progress<'a> = dyn FnMut(AccuracyProgress) -> anyhow::Result<()> + 'a;
 
 /// Compares the scene's levels and effects until `stop` becomes true; the variants that have been
-/// measured until then are returned, if their reference has. `progress` is called with each measured
-/// variant and each comparison.
+/// measured until then are returned, if their reference has. `progress` is called with each
+/// measured variant and each comparison.
 ///
 /// # Errors
 /// If [`AccuracySpec::check`] fails, a scene cannot be built, the scene's verdict is undecided, or

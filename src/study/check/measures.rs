@@ -45,7 +45,8 @@ fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
     Some(error_m.max(ERROR_FLOOR_M))
 }
 
-/// Error of a trial as [`error_m`] has it, over the reachable part of a surface that has another one.
+/// Error of a trial as [`error_m`] has it, over the reachable part of a surface that has another
+/// one.
 fn reachable_error_m(row: &TrialRow, touches: u32) -> Option<f64> {
     let error_m = REACHABLE_RMSE.value(row, touches).filter(|_| is_part(row))?;
     Some(error_m.max(ERROR_FLOOR_M))
