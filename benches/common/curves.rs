@@ -55,7 +55,7 @@ fn drawn(of: &str, panels: &[(&str, &[Curve])]) -> Option<String> {
     let areas = [first, second];
     let last = areas.get(panels.len().checked_sub(1)?)?;
     let mut canvas = Canvas::new(760.0, last.bottom() + 60.0);
-    legend.draw(&mut canvas, [80.0, 24.0]);
+    legend.draw(&mut canvas, [80.0, 24.0], "");
     for ((unit, curves), area) in panels.iter().zip(areas) {
         let points = || curves.iter().flat_map(|curve| &curve.values);
         let x = Axis::log(points().map(|(n, _)| *n))?;

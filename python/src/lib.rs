@@ -38,7 +38,7 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fork::remember_process();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("COMMIT", program::COMMIT)?;
-    module.add("PROTOCOL", PROTOCOL)?;
+    module.add("PROTOCOL", palpate::study::benchmark::PROTOCOL)?;
     module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
     module.add_class::<desk::PlannerChannel>()?;

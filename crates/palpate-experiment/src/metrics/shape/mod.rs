@@ -216,7 +216,7 @@ impl TrueShape {
             chamfer_m,
             chamfer_share: chamfer_m.map(|chamfer_m| round_share(chamfer_m / self.diagonal_m)),
             reached_2_mm: share(reached_m.iter().copied(), |way_m| way_m <= 2e-3).map(round_share),
-            reachable_chamfer_m: mean(reached_m.into_iter()),
+            reachable_chamfer_m: mean(reached_m),
             f_mm: Some([1e-3, 2e-3].map(|way_m| f_score(&from_true_m, &from_believed_m, way_m))),
             f_1: f_at(0.01),
             f_3: f_at(0.03),
