@@ -115,7 +115,7 @@ def test_a_planner_that_stays_in_a_corner_is_last_in_the_benchmark(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "runs" / "benchmark-3-quick" / "benchmark.json").read_text())
-    assert result["protocol"] == "3" and result["quick"]
+    assert result["protocol"] == "benchmark-3" and result["quick"]
     assert result["planners"][-1]["name"] == "my_planner:Corner"
 
 

@@ -37,6 +37,7 @@ def test_the_first_example_prints_a_table(page, tmp_path):
 PAGES = {
     "docs/many-runs.md": "many_runs",
     "docs/python.md": "guide",
+    "docs/questions.md": "questions",
     "docs/your-planner.md": "my_planner",
     "python/README.md": "readme",
 }

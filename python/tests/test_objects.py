@@ -251,7 +251,7 @@ def test_a_pickle_of_another_format_is_refused(bird):
     scene = palpate.Scene.load("toy")
     experiment = palpate.Experiment(scene="toy")
     belief, zone = bird.belief(0, "active", 14), scene.zone
-    for value in (belief, zone, palpate.Ball([0, 0, 0], 0.1), scene, scene.touch([0.3]), bird._core, experiment._core):
+    for value in (belief, zone, palpate.Ball([0, 0, 0], 0.1), scene, scene.touch([0.003]), bird._core, experiment._core):
         restore, ((_, version), *state) = value.__reduce__()
         assert version == palpate.__version__
         words = f"pickle of a {type(value).__name__} has format 99, written by palpate 7.0"

@@ -62,6 +62,14 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
                 counted(count, "trial")
             )
         }));
+        let is_missing = |first: &&MeasureResult| first.verdict == Verdict::Missing;
+        remarks.extend(planner.judgements.first().filter(is_missing).map(|first| {
+            let title = first.judged.title;
+            format!(
+                "{name}: the baseline or these trials have no {title}; an earlier version left it out: \
+                 write the baseline again with --accept REASON"
+            )
+        }));
         let is_open = |first: &&MeasureResult| first.verdict == Verdict::Undecided;
         remarks.extend(planner.judgements.first().filter(is_open).map(|first| {
             let percent = 100.0 * rules.tolerance;

@@ -175,9 +175,13 @@ fn differences(old: &StoredBaseline, new: &StoredBaseline, rules: &CheckOptions)
         }
         let planner = planner_of(old, rules, &new.lines, name);
         let first = planner.judgements.first()?;
-        let percent = first.judged.percent(first.sequence.mean);
+        let (title, sequence) = (first.judged.title, &first.sequence);
+        if sequence.count == 0 {
+            return Some(format!("{name}: {title} is new"));
+        }
+        let percent = first.judged.percent(sequence.mean);
         let trials = counted(planner.trials, "trial");
-        Some(format!("{name}: {} {percent:+.2} % in {trials}", first.judged.title))
+        Some(format!("{name}: {title} {percent:+.2} % in {trials}"))
     });
     let gone = known.iter().filter(|name| !names.contains(name));
     results.chain(gone.map(|name| format!("{name}: removed"))).collect()
