@@ -118,10 +118,11 @@ pub(super) fn run(args: &Args, talk: Verbosity, program: &Host) -> anyhow::Resul
     let server = Server::open(args.listen, Box::new(page))?;
     print(&format!("live page: {}", server.url()))?;
     let entry = if args.no_browser { None } else { open_browser(&server.url()) };
-    let is_opened = entry.is_some();
-    let live = Live { args, talk, program, server, interrupt, is_opened };
+    let is_watched = entry.is_some();
+    let mut live = Live { args, talk, program, server, interrupt, is_watched };
     let mut outcome = work.map_or(Ok(Completion::Done), |work| live.show(work))?;
     while let Some(experiment) = live.next(&starts) {
+        live.is_watched = true;
         // A mistake on the page leaves the page open.
         let path = new_folder(&experiment.name);
         match live.explore(experiment, path) {
@@ -180,8 +181,8 @@ struct Live<'a> {
     server: Arc<Server>,
     /// Set by Ctrl-C.
     interrupt: Arc<AtomicBool>,
-    /// Whether a browser was opened.
-    is_opened: bool,
+    /// Whether a browser was opened, or the experiment was started on the page.
+    is_watched: bool,
 }
 
 impl Live<'_> {
@@ -237,7 +238,7 @@ impl Live<'_> {
         desk.set_start(self.args.hold, self.args.approve);
         let truth = session.simulation().truth().clone();
         self.server.show(Arc::clone(&desk), truth, &path);
-        if self.is_opened {
+        if self.is_watched {
             desk.await_page(OPENING);
         }
         let halted = session.run(&mut folder, &done)?;
