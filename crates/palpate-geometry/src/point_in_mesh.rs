@@ -179,7 +179,7 @@ mod tests {
         }
     }
 
-    /// Boxes that share a whole face keep its triangles and their reverses, so that both are closed.
+    /// Boxes that share a whole face keep its triangles and their reverses: both are closed.
     #[test]
     fn a_face_shared_by_two_boxes_belongs_to_both() {
         let two =
