@@ -161,6 +161,11 @@ impl Experiment {
         paths::map(self, replace)
     }
 
+    /// Returns the experiment with empty paths: the contents of its files count, not their places.
+    pub fn without_paths(&self) -> Self {
+        self.with_paths(&mut |_| String::new()).unwrap_or_else(|| self.clone())
+    }
+
     /// Returns the paths among the settings with their dotted keys.
     pub fn paths(&self) -> Vec<(String, PathBuf)> {
         paths::list(self)

@@ -97,8 +97,7 @@ fn hash(row: &TrialRow) -> String {
 /// count; the contents of the files do, and those of the meshes in a folder.
 pub fn settings_hash(experiment: &Experiment) -> String {
     let settings = experiment.row_settings();
-    let without_paths = settings.with_paths(&mut |_| String::new());
-    let text = serde_json::to_vec(without_paths.as_ref().unwrap_or(&settings)).unwrap_or_default();
+    let text = serde_json::to_vec(&settings.without_paths()).unwrap_or_default();
     let mut hash = Sha256::new().chain_update(text);
     for (_, path) in settings.paths() {
         let entries = std::fs::read_dir(&path).into_iter().flatten().flatten();

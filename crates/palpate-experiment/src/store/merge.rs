@@ -26,8 +26,7 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
     let mut places = Vec::new();
     for path in shards {
         super::require_run(path)?;
-        let found = resolved::read(path, &[])?;
-        let is_same = resolved::without_paths(&found) == resolved::without_paths(&experiment)
+        let is_same = resolved::read(path, &[])?.without_paths() == experiment.without_paths()
             && surface::read(&path.join(SURFACE), &experiment)? == truth;
         if !is_same {
             let problem = format!(

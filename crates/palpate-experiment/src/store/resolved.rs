@@ -51,13 +51,8 @@ pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), RunErr
 /// the contents of their files are compared by their hashes.
 pub(super) fn check_identity(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     let found = read(folder, &[])?;
-    let identity = |it: &Experiment| resolved(&without_paths(&it.row_settings()));
+    let identity = |it: &Experiment| resolved(&it.row_settings().without_paths());
     check_equal(folder, RESOLVED, [&identity(&found), &identity(experiment)])
-}
-
-/// Returns the experiment with empty paths.
-pub(super) fn without_paths(experiment: &Experiment) -> Experiment {
-    experiment.with_paths(&mut |_| String::new()).unwrap_or_else(|| experiment.clone())
 }
 
 /// Checks that a `--set` assignment changes only the report.
