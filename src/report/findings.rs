@@ -32,9 +32,7 @@ pub fn final_values<'r>(run: &'r Run) -> Option<(&'static Measure, Vec<FinalValu
         .collect();
     let values = |measure: &Measure| -> Vec<FinalValue<'r>> {
         let value = |(name, point): &(&'r str, CurvePoint)| {
-            let summary = point.of(measure)?;
-            let is_median = measure.aggregate.has_median();
-            let value = if is_median { summary.median } else { summary.mean };
+            let value = point.representative(measure)?;
             let ends = curve_table::uncertainty(&run.experiment, &run.rows, point, measure);
             let shown = |value: f64| measure.unit.per_si * value;
             Some((*name, shown(value), ends.map(|ends| ends.map(shown))))

@@ -225,7 +225,7 @@ fn draw_measure(
 fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> {
     let per_si = measure.unit.per_si;
     let summary = point.of(measure)?;
-    let value = if measure.aggregate.has_median() { summary.median } else { summary.mean };
+    let value = point.representative(measure)?;
     let beside = match measure.scale {
         PanelAxis::LogBeside(other) => point.of(other).map(|other| other.median),
         _ => (measure.aggregate == Aggregate::Both).then_some(summary.mean),

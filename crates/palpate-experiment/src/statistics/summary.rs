@@ -49,6 +49,13 @@ impl CurvePoint {
         let index = MEASURES.iter().position(|other| other.id == measure.id)?;
         self.values.get(index)?.as_ref()
     }
+
+    /// Representative value of a measure: the median if it is reported, otherwise the mean; `None`
+    /// if no trial has the measure.
+    pub fn representative(&self, measure: &Measure) -> Option<f64> {
+        let summary = self.of(measure)?;
+        Some(if measure.aggregate.has_median() { summary.median } else { summary.mean })
+    }
 }
 
 /// Counts of events in one planner's trials.
