@@ -135,11 +135,7 @@ impl<'a, R: BufRead> Stepper<'a, R> {
                 },
                 Ok(Answer::Elsewhere(numbers)) => {
                     let target = task.region().target(&numbers);
-                    let fits = target.filter(|target| {
-                        let is_inside = task.region().contains(target);
-                        is_inside && task.approach(target).is_some()
-                    });
-                    match fits {
+                    match target.filter(|target| task.contains(target)) {
                         Some(target) => return Ok(Some(target)),
                         None => format!("{numbers:?} is outside the region, or out of reach"),
                     }

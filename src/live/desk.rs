@@ -471,10 +471,8 @@ impl Desk {
 
     /// Returns the target with these numbers, if the finger can touch it.
     fn allowed(&self, numbers: &[f64]) -> Result<Target, OrderError> {
-        let target = self.task.region().target(numbers).filter(|target| {
-            let is_inside = self.task.region().contains(target);
-            is_inside && self.task.approach(target).is_some()
-        });
+        let target = self.task.region().target(numbers);
+        let target = target.filter(|target| self.task.contains(target));
         target.ok_or_else(|| {
             let form = self.task.region().tap_form();
             OrderError(format!(
