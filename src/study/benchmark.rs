@@ -11,7 +11,7 @@ use crate::experiment::Experiment;
 use crate::experiment::measure::{self, Measure};
 use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
-use crate::experiment::statistics::median;
+use crate::experiment::statistics::{mean, median};
 use crate::experiment::store::Run;
 use palpate_input::error::InputError;
 use palpate_input::files;
@@ -85,7 +85,7 @@ pub struct PlannerResult {
     pub gap_closed: Option<f64>,
     /// The same over the objects that fill their zone.
     pub gap_closed_full: Option<f64>,
-    /// The same over the others.
+    /// The same over the others; `None` for whole objects.
     pub gap_closed_open: Option<f64>,
     /// Error after each budget, relative to the reference.
     pub after: Vec<RelativeError>,
@@ -220,13 +220,13 @@ impl BenchmarkSpec<'_> {
     /// # Errors
     /// If the protocol or an object cannot be read, or a planner is not one.
     pub fn experiments(&self, planners: &[String]) -> anyhow::Result<Vec<Experiment>> {
-        if let Some((list, folder)) = objects::list(self.path, self.objects)? {
+        if let Some((protocol, folder)) = objects::protocol(self.path, self.objects)? {
             let sets = QUICK_OBJECTS.map(String::from);
             let sets = if self.is_quick { &sets[..] } else { &[] };
             let load = |(name, mesh): &(String, PathBuf)| {
-                list.experiment(self.path, (name, mesh), sets, planners)
+                protocol.experiment((name, mesh), sets, planners)
             };
-            return list.meshes(folder)?.iter().map(load).collect();
+            return protocol.meshes(folder)?.iter().map(load).collect();
         }
         let sets = if self.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
         let mut experiments = cells(self.path, &sets, planners)?.experiments;
@@ -319,6 +319,7 @@ fn planner(
         (!counted.is_empty()).then(|| gap_closed(compared, entrant, &counted, SEED))?
     };
     let is_full = |name: &str| name.ends_with(FULL);
+    let has_zones = runs.iter().all(|run| run.experiment.scene.whole_object.is_none());
     let number = |is_it: fn(&RelativeError) -> bool| {
         objects.iter().filter(|object| is_it(&object.error)).count()
     };
@@ -329,7 +330,7 @@ fn planner(
         worse_on: number(RelativeError::is_above_1),
         gap_closed: gap(&|_| true).map(|gap| gap.value),
         gap_closed_full: gap(&is_full).map(|gap| gap.value),
-        gap_closed_open: gap(&|name| !is_full(name)).map(|gap| gap.value),
+        gap_closed_open: gap(&|name| has_zones && !is_full(name)).map(|gap| gap.value),
         after: budgets.iter().map(|&budget| after(entrant, runs, compared, budget)).collect(),
         trials: objects.iter().map(|object| object.trials).sum(),
         failures: objects.iter().map(|object| object.failures).sum(),
@@ -361,7 +362,7 @@ fn shape_means(
     let measures = SHAPE_MEASURES.into_iter().filter_map(measure::by_id);
     let after = |measure: &Measure| {
         let mean_after =
-            |budget: &u32| mean(rows.iter().filter_map(|row| measure.value(row, *budget)));
+            |budget: &u32| known_mean(rows.iter().filter_map(|row| measure.value(row, *budget)));
         budgets.iter().map(mean_after).collect()
     };
     measures.map(|measure| (measure.id, after(measure))).collect()
@@ -376,14 +377,14 @@ fn means_over(
     let after = |name: &'static str| {
         let values =
             |i: usize| objects.iter().filter_map(move |it| *it.measures.get(name)?.get(i)?);
-        (0..budgets).map(|i| mean(values(i))).collect()
+        (0..budgets).map(|i| known_mean(values(i))).collect()
     };
     names.map(|name| (*name, after(name))).collect()
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
-    (count > 0.0).then(|| sum / count)
+fn known_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| mean(&values))
 }
 
 /// Error of a planner after some touches, relative to the reference in the same trial.

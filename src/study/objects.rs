@@ -14,7 +14,7 @@ use palpate_input::files;
 use palpate_input::format::hex;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -27,10 +27,19 @@ const MESH_MAX: u64 = 1 << 30;
 /// Number of objects that a message names.
 const NAMED_MAX: usize = 5;
 
-/// Objects of a protocol.
-#[derive(Debug, Deserialize)]
+/// Protocol on meshes of a folder.
+pub struct ObjectProtocol {
+    path: PathBuf,
+    /// Experiment on each object, without its scene.
+    experiment: Table,
+    objects: ObjectList,
+    up: UpAxis,
+}
+
+/// Table `[objects]` of a protocol.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ObjectList {
+struct ObjectList {
     /// Place from which the user gets the folder.
     source: String,
     /// Unit of the numbers in the meshes.
@@ -41,23 +50,30 @@ pub struct ObjectList {
     sha256: BTreeMap<String, String>,
 }
 
-impl ObjectList {
-    /// Reads the objects of the protocol at `path`; `None` if it explores shipped scenes.
+impl ObjectProtocol {
+    /// Reads the protocol at `path`; `None` if it explores shipped scenes.
     ///
     /// # Errors
-    /// If the protocol cannot be read, or its table of objects is invalid.
+    /// If it cannot be read, or its table of objects is invalid.
     pub fn read(path: &Path) -> anyhow::Result<Option<Self>> {
-        let Some(value) = protocol(path)?.remove(OBJECTS) else { return Ok(None) };
-        let list: Self =
-            value.try_into().with_context(|| format!("{}: objects", path.display()))?;
-        list.up_axis().map_err(|error| error.at(path.display()))?;
-        Ok(Some(list))
+        let named = || path.display().to_string();
+        let text = files::text(path, files::TEXT_MAX).with_context(named)?;
+        let mut experiment: Table = text.parse().with_context(named)?;
+        let Some(value) = experiment.remove(OBJECTS) else { return Ok(None) };
+        let objects: ObjectList =
+            value.try_into().with_context(|| format!("{}: {OBJECTS}", named()))?;
+        let up = UpAxis::from_str(&objects.up, false).map_err(|_| {
+            InputError::new("objects.up")
+                .at(path.display())
+                .value(&objects.up)
+                .allowed("x, y, z, -x, -y and -z")
+        })?;
+        Ok(Some(Self { path: path.into(), experiment, objects, up }))
     }
 
-    fn up_axis(&self) -> Result<UpAxis, InputError> {
-        UpAxis::from_str(&self.up, false).map_err(|_| {
-            InputError::new("objects.up").value(&self.up).allowed("x, y, z, -x, -y and -z")
-        })
+    /// Place from which the user gets the objects.
+    pub fn source(&self) -> &str {
+        &self.objects.source
     }
 
     /// Returns the meshes in `folder` by the names of their objects: that of the mesh, or of its
@@ -66,8 +82,9 @@ impl ObjectList {
     /// # Errors
     /// If one of them is missing, or has other contents.
     pub fn meshes(&self, folder: &Path) -> anyhow::Result<Vec<(String, PathBuf)>> {
+        let ObjectList { source, sha256: listed, .. } = &self.objects;
         let mut problems = Vec::new();
-        for (name, sha256) in &self.sha256 {
+        for (name, sha256) in listed {
             match files::bytes(&folder.join(name), MESH_MAX) {
                 Err(cause) => problems.push(format!("{name}: {cause}")),
                 Ok(bytes) if hex(Sha256::digest(&bytes)) != *sha256 => {
@@ -77,38 +94,32 @@ impl ObjectList {
             }
         }
         if !problems.is_empty() {
-            let (count, of) = (problems.len(), self.sha256.len());
+            let (count, of) = (problems.len(), listed.len());
             let more = count.saturating_sub(NAMED_MAX);
             problems.truncate(NAMED_MAX);
             let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
             bail!(
-                "{}: {count} of {of} objects of the protocol are missing or differ; get them from {}\n  {}{more}",
+                "{}: {count} of {of} objects of the protocol are missing or differ; get them from {source}\n  {}{more}",
                 folder.display(),
-                self.source,
                 problems.join("\n  ")
             );
         }
-        let stem = |name: &str| Path::new(name).file_stem().map(|stem| stem.to_owned());
-        let mut stems: Vec<_> = self.sha256.keys().map(|name| stem(name)).collect();
-        stems.sort();
-        stems.dedup();
-        let is_unique = stems.len() == self.sha256.len();
-        let name_of = |name: &String| {
-            let path = Path::new(name);
-            let parent = path.parent().and_then(Path::file_name).filter(|_| !is_unique);
-            let name = parent.map(|it| it.to_owned()).or_else(|| stem(name)).unwrap_or_default();
+        let stems: BTreeSet<_> = listed.keys().map(|name| Path::new(name).file_stem()).collect();
+        let has_names = stems.len() == listed.len();
+        let name_of = |path: &Path| {
+            let folder = path.parent().and_then(Path::file_name).filter(|_| !has_names);
+            let name = folder.or_else(|| path.file_stem()).unwrap_or_default();
             name.to_string_lossy().into_owned()
         };
-        Ok(self.sha256.keys().map(|name| (name_of(name), folder.join(name))).collect())
+        Ok(listed.keys().map(|name| (name_of(Path::new(name)), folder.join(name))).collect())
     }
 
-    /// Loads the experiment of the protocol at `path` on the whole object of a mesh.
+    /// Loads the experiment on the whole object of a mesh.
     ///
     /// # Errors
     /// If the mesh or the protocol cannot be used.
     pub fn experiment(
         &self,
-        path: &Path,
         (name, mesh): (&str, &Path),
         sets: &[String],
         planners: &[String],
@@ -118,46 +129,41 @@ impl ObjectList {
             is_beside: false,
             is_around: true,
             side: ObjectSide::Front,
-            up: Some(self.up_axis()?),
-            unit: Some(self.unit),
+            up: Some(self.up),
+            unit: Some(self.objects.unit),
             finger: FingerKind::Rigid,
             allow_external_buffers: false,
         };
         // Unit and axis are given, so nothing is asked or noted.
         let asker = Asker { choose: &|_, _| None, note: &|_| () };
         let scene: Table = MeshPlacement::new(&options, asker)?.scene(&options)?.parse()?;
-        let mut table = protocol(path)?;
-        table.remove(OBJECTS);
+        let mut table = self.experiment.clone();
         table.insert("scene".into(), Value::Table(scene));
         let text = toml::to_string(&table)?;
-        let load =
-            |sets: &[String]| Experiment::from_loader(Loader::from_text(path, text.clone())?, sets);
+        let load = |sets: &[String]| {
+            Experiment::from_loader(Loader::from_text(&self.path, text.clone())?, sets)
+        };
         let mut experiment = with_planners(sets, planners, load)?;
         experiment.name += &format!("-{name}");
         Ok(experiment)
     }
 }
 
-fn protocol(path: &Path) -> anyhow::Result<Table> {
-    let text = files::text(path, files::TEXT_MAX);
-    let text = text.with_context(|| path.display().to_string())?;
-    text.parse().with_context(|| path.display().to_string())
-}
-
-/// Returns the objects of a protocol with their folder; `None` if it explores shipped scenes.
+/// Returns the protocol at `path` on objects, with their folder; `None` if it explores shipped
+/// scenes.
 ///
 /// # Errors
 /// If the protocol has objects and no folder is given, or the reverse.
-pub fn list<'a>(
+pub fn protocol<'a>(
     path: &Path,
     folder: Option<&'a Path>,
-) -> anyhow::Result<Option<(ObjectList, &'a Path)>> {
-    match (ObjectList::read(path)?, folder) {
-        (Some(list), Some(folder)) => Ok(Some((list, folder))),
-        (Some(list), None) => bail!(
+) -> anyhow::Result<Option<(ObjectProtocol, &'a Path)>> {
+    match (ObjectProtocol::read(path)?, folder) {
+        (Some(protocol), Some(folder)) => Ok(Some((protocol, folder))),
+        (Some(protocol), None) => bail!(
             "{}: its objects are not shipped: get them from {}, then use --objects FOLDER",
             path.display(),
-            list.source
+            protocol.source()
         ),
         (None, folder) => {
             ensure!(
