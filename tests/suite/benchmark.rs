@@ -15,6 +15,7 @@ use palpate::study::benchmark::{
     BenchmarkResult, BenchmarkSource, PROTOCOL, REFERENCE, protocol_sha256, summarise,
 };
 use palpate::study::compare::compare;
+use palpate::study::objects::ObjectProtocol;
 use palpate_input::format::hex;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -197,6 +198,33 @@ fn a_quick_benchmark_runs_and_continues() {
     assert!(!palpate(root, &["benchmark", "--trials", "3"]).status.success());
 }
 
+/// A cube as OBJ.
+fn cube(size: f64) -> String {
+    let mesh = box_mesh(Point3::origin(), Point3::new(size, size, size));
+    let vertices = mesh.vertices().iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+    let corners = mesh.triangles().iter().map(|corners| corners.map(|i| i + 1));
+    let faces = corners.map(|[a, b, c]| format!("f {a} {b} {c}\n"));
+    vertices.chain(faces).collect()
+}
+
+/// The shipped protocol on YCB has settings and planners for whole objects, of which one is the
+/// reference.
+#[test]
+fn the_protocol_on_ycb_runs_on_any_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("cube.obj");
+    fs::write(&mesh, cube(0.05)).unwrap();
+    let path = Path::new("experiments/suite/ycb-shape.toml");
+    let protocol = ObjectProtocol::read(path).unwrap().unwrap();
+    let experiment = protocol.experiment(("cube", &mesh), &[], &[]).unwrap();
+    assert_eq!(experiment.name, "ycb-shape-cube");
+    assert!(experiment.planners.iter().any(|planner| planner == REFERENCE));
+    let simulation = Simulation::new(experiment).unwrap();
+    assert!(simulation.experiment().planners.iter().all(|it| simulation.planner(it).is_some()));
+    let unknown = protocol.meshes(folder.path()).unwrap_err().to_string();
+    assert!(unknown.contains("78 of 78 objects"), "{unknown}");
+}
+
 /// A protocol on objects of a folder: what is missing or differs is named, each object is explored
 /// all around, and the result has its measures.
 #[test]
@@ -206,13 +234,6 @@ fn a_protocol_runs_on_the_meshes_of_a_folder() {
         let path = folder.path().join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, text).unwrap();
-    };
-    let cube = |size: f64| {
-        let mesh = box_mesh(Point3::origin(), Point3::new(size, size, size));
-        let vertices = mesh.vertices().iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
-        let corners = mesh.triangles().iter().map(|corners| corners.map(|i| i + 1));
-        let faces = corners.map(|[a, b, c]| format!("f {a} {b} {c}\n"));
-        vertices.chain(faces).collect::<String>()
     };
     for (name, size) in [("small", 0.04), ("large", 0.06)] {
         write(&format!("meshes/{name}/textured.obj"), &cube(size));
