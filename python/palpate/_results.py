@@ -24,6 +24,15 @@ __all__ = [
 _Rows = list[dict[str, Any]]
 
 
+class _Study:
+    """Result that is printed as the command's text."""
+
+    _text: str
+
+    def __str__(self) -> str:
+        return self._text
+
+
 def _hidden() -> Any:
     """Returns a field that is no part of the interface."""
     return field(repr=False, compare=False)
@@ -64,7 +73,7 @@ class CheapestScene:
 
 
 @dataclass(frozen=True)
-class AccuracyResult:
+class AccuracyResult(_Study):
     """Result of `palpate.accuracy`.
 
     Attributes:
@@ -107,15 +116,12 @@ class AccuracyResult:
         """
         return _frame(self._table)
 
-    def __str__(self) -> str:
-        return self._text
-
     def _repr_html_(self) -> str:
         return page(self.scene, picture(self._svg) + preformatted(self._text))
 
 
 @dataclass(frozen=True)
-class BandResult:
+class BandResult(_Study):
     """Result of `palpate.calibrate_band`.
 
     Attributes:
@@ -143,15 +149,12 @@ class BandResult:
         """Returns a row per number of touches and probability: the share of the truth below that quantile."""
         return _frame(self._reliability)
 
-    def __str__(self) -> str:
-        return self._text
-
     def _repr_html_(self) -> str:
         return page("", picture(self._svg) + preformatted(self._text))
 
 
 @dataclass(frozen=True)
-class IdentifyResult:
+class IdentifyResult(_Study):
     """Result of `palpate.identify`.
 
     Attributes:
@@ -197,20 +200,17 @@ class IdentifyResult:
         """Returns a row per touch: the probability of each object or class after it, and of none of them as "none"."""
         return _frame(self._history).fillna(0.0)
 
-    def __str__(self) -> str:
-        return self._text
-
     def _repr_html_(self) -> str:
         return preformatted(self._text)
 
 
 @dataclass(frozen=True)
-class BenchmarkResult:
+class BenchmarkResult(_Study):
     """Result of `palpate.benchmark`.
 
     Attributes:
-        protocol: version of the protocol.
-        protocol_sha256: hash of the protocol's files. Results can be compared if version and hash are equal.
+        protocol: name of the protocol.
+        protocol_sha256: hash of the protocol's files. Results can be compared if name and hash are equal.
         quick: whether objects and trials were left out, so that the result cannot be compared.
         reference: planner whose errors are the unit.
         objects: names of the objects.
@@ -244,6 +244,7 @@ class BenchmarkResult:
             for budget, it in zip(found["budgets"], after, strict=True):
                 key = f"error_after_{budget}"
                 later |= {key: it["error"], **_ends(key, it["error_interval"])}
+            later |= _after(found["budgets"], planner.pop("measures", {}))
             rows.append({"planner": name, **own, **planner, **later})
             for it in on_objects:
                 ends = _ends("error", it.pop("error_interval"))
@@ -251,7 +252,8 @@ class BenchmarkResult:
                     f"after_{budget}_m": error_m
                     for budget, error_m in zip(found["budgets"], it.pop("error_m"), strict=True)
                 }
-                per_object.append({"planner": name, **it, **ends, **medians})
+                shapes = _after(found["budgets"], it.pop("measures", {}))
+                per_object.append({"planner": name, **it, **ends, **medians, **shapes})
         names = ("protocol", "protocol_sha256", "quick", "reference", "trials", "touches")
         return cls(
             **{name: found[name] for name in names},
@@ -269,7 +271,8 @@ class BenchmarkResult:
 
         `error` is exp(mean log error over the touches after the initial ones), relative to the reference in the same
         trial: the geometric mean over trials and objects, with its 95 % interval. `better_on` and `worse_on` count the
-        objects whose interval excludes 1; `gap_closed` is the share of the way from `random` to the oracle.
+        objects whose interval excludes 1; `gap_closed` is the share of the way from `random` to the oracle. Whole
+        objects have the mean of each measure, as in `iou_after_60`.
         """
         return _frame(self._table)
 
@@ -281,16 +284,13 @@ class BenchmarkResult:
         """Returns the document `benchmark.json` of the command."""
         return self._document
 
-    def __str__(self) -> str:
-        return self._text
-
     def _repr_html_(self) -> str:
         is_partial = ", quick: not comparable" if self.quick else ""
         return page(f"benchmark {self.protocol}{is_partial}", self._html)
 
 
 @dataclass(frozen=True)
-class SuiteComparison:
+class SuiteComparison(_Study):
     """Result of `palpate.compare`: planners over several runs.
 
     Attributes:
@@ -332,9 +332,6 @@ class SuiteComparison:
         """Returns a row per planner: its error over all objects, relative to the reference, with the 95 % interval."""
         return _frame(self._overall)
 
-    def __str__(self) -> str:
-        return self._text
-
     def _repr_html_(self) -> str:
         return page(self.conclusion or "", self._html + picture(self._svg))
 
@@ -350,6 +347,15 @@ def _ends(name: str, interval: list[float] | None) -> dict[str, float | None]:
     """Returns the ends of an interval as columns."""
     low, high = interval or (None, None)
     return {f"{name}_low": low, f"{name}_high": high}
+
+
+def _after(budgets: list[int], measures: Mapping[str, list[float | None]]) -> dict[str, float | None]:
+    """Returns the values of measures after some touches as columns."""
+    return {
+        f"{name}_after_{budget}": value
+        for name, values in measures.items()
+        for budget, value in zip(budgets, values, strict=True)
+    }
 
 
 #: Parts of a difference without its unit.

@@ -114,8 +114,17 @@ class _Explorations:
         reward: str,
         randomise: Randomised | None,
         threads: int,
+        mode: str | None,
+        metadata: dict[str, Any],
         settings: dict[str, Any],
     ) -> None:
+        modes = metadata["render_modes"]
+        if mode is not None and mode not in modes:
+            raise ValueError(f"render_mode = {mode!r}: allowed are {', '.join(modes)}, or None")
+        self._mode = mode
+        self._fps = metadata["render_fps"]
+        # Created with the first picture: Stable-Baselines3 asks for "rgb_array" and may never draw.
+        self._renderer: Renderer | None = None
         each: Sequence[_Scene]
         if scene in ("suite", "suite/around"):
             each = sorted((HOME / "scenes" / str(scene)).glob("*.toml"))
@@ -171,13 +180,25 @@ class _Explorations:
             raise ValueError(f"action = {actions}: allowed are integers from 0 to {last}")
         return self.core.step(self.finite[indices])
 
-    def title(self, step: dict[str, Any], index: int) -> str:
+    def draw(self, step: dict[str, Any], index: int) -> npt.NDArray[np.uint8]:
+        """Draws the belief of an environment after a step; {} before the first."""
+        if self._renderer is None:
+            self._renderer = Renderer(str(self._mode), self._fps)
+        return self._renderer.draw(self.core.belief(index), self._title(step, index) if step else "")
+
+    def _title(self, step: dict[str, Any], index: int) -> str:
         """Describes the last touch of an environment."""
         count = f"{int(step['count'][index])} touches"
         if not self.measures:
             return f"{count}, no belief"
         measure = self.measures[0]
         return f"{count}, {measure.removesuffix('_m')} {1e3 * float(step[measure][index]):.2f} mm"
+
+    def close(self) -> None:
+        """Closes the window or the figure."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def observations(self, step: dict[str, Any]) -> _Observation:
         """Returns the observations of all environments."""
@@ -240,9 +261,6 @@ class TouchEnv(gymnasium.Env[_Observation, _Action]):
         randomise: Randomised | None = None,
         **settings: Any,
     ) -> None:
-        _check_mode(render_mode, self.metadata)
-        # Created with the first picture: Stable-Baselines3 asks for "rgb_array" and may never draw.
-        self._renderer: Renderer | None = None
         self._all = _Explorations(
             1,
             scene,
@@ -254,13 +272,15 @@ class TouchEnv(gymnasium.Env[_Observation, _Action]):
             reward=reward,
             randomise=randomise,
             threads=1,
+            mode=render_mode,
+            metadata=self.metadata,
             settings=settings,
         )
         self.finite_actions = self._all.finite
         self.action_space = self._all.action
         self.observation_space = self._all.observation
         self.render_mode = render_mode
-        self._title = ""
+        self._step: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -281,24 +301,17 @@ class TouchEnv(gymnasium.Env[_Observation, _Action]):
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Returns a picture of the belief with `render_mode="rgb_array"`, shape (height, width, 3)."""
-        return self._draw() if self.render_mode == "rgb_array" else None
+        return self._all.draw(self._step, 0) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Closes the window."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._all.close()
 
     def _finish(self, step: dict[str, Any]) -> None:
-        """Describes a touch, and shows it in the window."""
-        self._title = self._all.title(step, 0)
+        """Keeps a step for its picture, and shows it in the window."""
+        self._step = step
         if self.render_mode == "human":
-            self._draw()
-
-    def _draw(self) -> npt.NDArray[np.uint8]:
-        if self._renderer is None:
-            self._renderer = Renderer(str(self.render_mode), self.metadata["render_fps"])
-        return self._renderer.draw(self._all.core.belief(0), self._title)
+            self._all.draw(step, 0)
 
     def _observation(self, step: dict[str, Any]) -> _Observation:
         seen = {name: values[0] for name, values in self._all.observations(step).items()}
@@ -344,8 +357,6 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[Any], npt.NDArray[Any]]
         randomise: Randomised | None = None,
         **settings: Any,
     ) -> None:
-        _check_mode(render_mode, self.metadata)
-        self._renderer: Renderer | None = None
         self._step: dict[str, Any] = {}
         self.num_envs = num_envs
         self._all = _Explorations(
@@ -359,6 +370,8 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[Any], npt.NDArray[Any]]
             reward=reward,
             randomise=randomise,
             threads=threads,
+            mode=render_mode,
+            metadata=self.metadata,
             settings=settings,
         )
         self.finite_actions = self._all.finite
@@ -396,16 +409,11 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[Any], npt.NDArray[Any]]
         """Returns a picture of each belief with `render_mode="rgb_array"`, shape (height, width, 3)."""
         if self.render_mode is None:
             return None
-        if self._renderer is None:
-            self._renderer = Renderer(self.render_mode, self.metadata["render_fps"])
-        each = range(self.num_envs)
-        return tuple(self._renderer.draw(self._all.core.belief(i), self._all.title(self._step, i)) for i in each)
+        return tuple(self._all.draw(self._step, i) for i in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Closes the figure."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._all.close()
 
     def _info(self, step: dict[str, Any]) -> dict[str, Any]:
         self._step = step
@@ -417,12 +425,6 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[Any], npt.NDArray[Any]]
         if step["drawn"]:
             info["randomised"] = step["drawn"]
         return info
-
-
-def _check_mode(mode: str | None, metadata: dict[str, Any]) -> None:
-    modes = metadata["render_modes"]
-    if mode is not None and mode not in modes:
-        raise ValueError(f"render_mode = {mode!r}: allowed are {', '.join(modes)}, or None")
 
 
 gymnasium.register(

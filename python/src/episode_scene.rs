@@ -4,7 +4,7 @@ use crate::exploration::ExplorationScene;
 use crate::known::BeliefSettings;
 use crate::scene::{self, GivenMesh, Scene};
 use crate::{errors, fork};
-use palpate::config::{ConfigError, Loader};
+use palpate::config::ConfigError;
 use palpate::error::InputError;
 use palpate::sim;
 use palpate::sim::library::LoadedLibrary;
@@ -154,8 +154,7 @@ impl EpisodeScene {
         }
         let sets = self.drawn.iter().zip(numbers);
         let sets: Vec<String> = sets.map(|(setting, it)| setting.assignment(it)).collect();
-        let text = self.settings.to_toml(false);
-        sim::Scene::from_loader(Loader::from_text(errors::SETTINGS.as_ref(), text)?, &sets)
+        scene::assigned(&self.settings, &sets)
     }
 
     /// Builds a scene, with an object of the library that `random` draws.

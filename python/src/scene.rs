@@ -11,7 +11,7 @@ use crate::target::TargetInput;
 use crate::zone::Zone;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use palpate::backend::Fault;
-use palpate::config::Loader;
+use palpate::config::{ConfigError, Loader};
 use palpate::error::InputError;
 use palpate::explore::evidence::{Contact, Outcome};
 use palpate::explore::probe::Probe;
@@ -55,6 +55,15 @@ fn given_mesh(py: Python<'_>, mesh: Option<&MeshArrays>) -> PyResult<Option<Give
         mesh_of(&vertices.bind(py).readonly(), &triangles.bind(py).readonly())
     };
     mesh.map(read).transpose()
+}
+
+/// Returns the settings of a scene after `--set` assignments.
+///
+/// # Errors
+/// The first invalid value.
+pub(crate) fn assigned(settings: &sim::Scene, sets: &[String]) -> Result<sim::Scene, ConfigError> {
+    let loader = Loader::from_text(errors::SETTINGS.as_ref(), settings.to_toml(false))?;
+    sim::Scene::from_loader(loader, sets)
 }
 
 /// Builds the environment of a scene, with the mesh, if there is one, in place of its object.
@@ -115,7 +124,7 @@ impl Scene {
     /// Returns the mesh in place of the object's file, if there is one.
     ///
     /// # Errors
-    /// As for [`mesh_of`].
+    /// If the arrays are not those of a mesh.
     pub(crate) fn given_mesh(&self, py: Python<'_>) -> PyResult<Option<GivenMesh>> {
         given_mesh(py, self.mesh.as_ref())
     }
@@ -267,9 +276,8 @@ impl Scene {
 
     /// Returns the scene after assignments of further settings.
     fn _with(&self, py: Python<'_>, sets: Vec<String>, seed: u64) -> PyResult<Self> {
-        let text = Loader::from_text(errors::SETTINGS.as_ref(), self.settings.to_toml(false));
-        let read = text.and_then(|loader| sim::Scene::from_loader(loader, &sets));
-        Self::build(py, read.map_err(errors::config)?, self.mesh_arrays(py), seed)
+        let settings = assigned(&self.settings, &sets).map_err(errors::config)?;
+        Self::build(py, settings, self.mesh_arrays(py), seed)
     }
 
     #[staticmethod]
