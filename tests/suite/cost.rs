@@ -76,12 +76,12 @@ fn a_bad_table_is_an_error() {
     }
 }
 
-/// The same program gives equal counts within 0.1 % under any load, and 10 % more is worse. Skipped
-/// without valgrind, unless `PALPATE_REQUIRE` is 1.
+/// The same program gives equal counts under any load, but for the set-up's scatter, a fiftieth of
+/// a million; 10 % more is worse. Skipped without valgrind, unless `PALPATE_REQUIRE` is 1.
 #[test]
 fn a_trial_is_counted_by_valgrind() {
     let script = Script::new();
-    let sets = "set = [\"touches=6\", \"initial_touches=3\", 'planners=[\"random\"]']\n";
+    let sets = "set = [\"touches=24\", \"initial_touches=3\", 'planners=[\"random\"]']\n";
     fs::write(script.table(), format!("tolerance = 0.02\n{WORK}{sets}")).unwrap();
     let (code, said) = script.run(&["--write"]);
     assert_eq!(code, Some(0), "{said}");
