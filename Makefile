@@ -200,6 +200,7 @@ test: setup $(if $(PART),$(foreach part,$(PART),$(needs-$(part))),test-code test
 test-code: setup ## Tests that need no simulated arm in real time
 	cargo test --locked --features $(FEATURES)
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features $(FEATURES) --example $$example || exit; done
+	python3 -B tests/test_results.py
 	tests/clusters/test.sh target/debug/palpate
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
@@ -229,6 +230,7 @@ texts: setup ## Writes docs/reference.md and tests/messages.txt, which tests com
 # The guides and the references of Python and Rust; a broken link is an error. All pages are always built, because Sphinx
 # does not repeat warnings for unchanged pages.
 define site
+python3 -B benches/results.py check
 rm -rf target/docs-site
 $(DEPS)/python/bin/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -c docs -d target/docs-tree . target/docs-site
 RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features $(FEATURES)
