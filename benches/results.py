@@ -9,13 +9,15 @@ A CSV file has a row for each commit and planner, in SI units: `F` is a figure, 
 95 % interval, `M_after_N` is the measure M after N touches. A page shows the newest commit of PROTOCOL.csv between
 `<!-- table: PROTOCOL -->` and `<!-- end -->`; `TABLES` selects columns and rows.
 
+Files without SHA-256 hold results of other commands, which the page names. A table shows the newest row of each case
+and planner; the figure omits them. Their rows until 2026-11-30 have the commit that stored them in the docs.
+
 Exit codes: 0 done, 1 a table or the figure differs, 2 error.
 """
 
 import argparse
 import csv
 import datetime
-import functools
 import io
 import json
 import math
@@ -66,20 +68,26 @@ class Bad(Exception):
 class Selection:
     """Columns and rows of a table that has not all of them."""
 
-    def __init__(self, columns, labels=None):
-        """`columns` are (title, function of a row); `labels` are rows, each with its text in the first column."""
-        self.columns, self.labels = columns, labels
+    def __init__(self, columns, labels=None, first="planner"):
+        """`columns` are (title, function of a row); `labels` are planners with their texts in the first column, whose title
+        is `first`."""
+        self.columns, self.labels, self.first = columns, labels, first
+
+
+def show(name, factor=1, decimals=None, has_interval=False):
+    """Returns the function that shows a column of a row."""
+    return lambda row: estimate(row, name, factor, decimals) if has_interval else text_of(row, name, factor, decimals)
 
 
 # Selections by page and table.
 TABLES = {
     ("README.md", "benchmark-3"): Selection(
         [
-            ("error", lambda row: estimate(row, "error")),
-            ("better on", lambda row: cell(row, "better_on")),
-            ("worse on", lambda row: cell(row, "worse_on")),
-            ("gap closed, full zones, %", lambda row: cell(row, "gap_closed_full")),
-            ("open zones, %", lambda row: cell(row, "gap_closed_open")),
+            ("error", show("error", has_interval=True)),
+            ("better on", show("better_on", decimals=0)),
+            ("worse on", show("worse_on", decimals=0)),
+            ("gap closed, full zones, %", show("gap_closed_full", 100, 0)),
+            ("open zones, %", show("gap_closed_open", 100, 0)),
         ],
         {
             "expected_contact": "`expected_contact`",
@@ -88,6 +96,33 @@ TABLES = {
             "sobol": "`sobol` (no model)",
             "random": "`random`",
         },
+    ),
+    ("docs/whole-objects.md", "around-reporting"): Selection(
+        [
+            ("n", show("n", decimals=0)),
+            *((f"after {count} touches", show(f"chamfer_share_after_{count}", 100, 2)) for count in (10, 20, 40, 60)),
+            ("IoU", show("iou_after_60", decimals=2)),
+            ("within 2 σ, `sd_inflation` 1.6", show("within_2_sigma_after_60", decimals=3)),
+        ],
+    ),
+    ("docs/recognition.md", "recognition"): Selection(
+        [
+            ("n trials", show("n", decimals=0)),
+            *((f"right after {budget}", show(f"right_after_{budget}", decimals=2)) for budget in (3, 5, 10)),
+            ("95 % sure after (median)", show("touches_until_sure", decimals=0)),
+            ("ADD-S after 10, mm (median)", show("add_s_m_after_10", 1000, 2)),
+        ],
+        first="objects, planner",
+    ),
+    ("docs/paper.md", "paper-finger"): Selection(
+        [
+            *((planner, show(f"{planner}_rmse_m", 1000, 2)) for planner in ("active", "sobol", "random")),
+            ("active − random", show("difference_m", 1000, 2, has_interval=True)),
+        ],
+        first="object, touches, finger",
+    ),
+    ("docs/paper.md", "paper-equal-error"): Selection(
+        [(name, show(f"{name}_touches", decimals=0, has_interval=True)) for name in ("toy", "container", "bird")],
     ),
 }
 
@@ -294,10 +329,21 @@ def csv_text(rows):
     return text.getvalue()
 
 
+def is_protocol(rows):
+    """Returns whether the rows are those of a protocol of `palpate benchmark`."""
+    return any(row["protocol_sha256"] for row in rows)
+
+
 def newest(rows):
-    """Returns the rows of the newest commit."""
-    last = max(rows, key=lambda row: row["date"])
-    return [row for row in rows if row["commit"] == last["commit"]]
+    """Returns the rows of the newest commit, or without a protocol the newest row of each case and planner."""
+    if is_protocol(rows):
+        last = max(rows, key=lambda row: row["date"])
+        return [row for row in rows if row["commit"] == last["commit"]]
+    found = {}
+    for row in rows:
+        key = row.get("case"), row["planner"]
+        found[key] = max(found.get(key, row), row, key=lambda row: row["date"])
+    return list(found.values())
 
 
 # Tables.
@@ -313,7 +359,7 @@ def number(value, factor=1, decimals=None):
         # Rounding can add a digit: 0.9996 is 1.00.
         decimals -= 1 if decimals and abs(round(value, decimals)) >= 10 ** (3 - decimals) else 0
     text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    return text.replace("-", "" if float(text) == 0 else "−")
 
 
 def described(name):
@@ -324,18 +370,25 @@ def described(name):
     return title.replace("{budget}", budget), factor, decimals
 
 
-def cell(row, name):
+def text_of(row, name, factor, decimals):
     """Returns a number of a row as text; `–` for counts of the reference, which is compared with itself."""
     if name in ("better_on", "worse_on") and row["planner"] == row.get("reference"):
         return "–"
-    _, factor, decimals = described(name)
+    # A trial of this length does not suffice.
+    if row.get(f"{name}_over"):
+        return f"over {number(row[f'{name}_over'], factor, decimals)}"
     return number(row.get(name), factor, decimals)
 
 
-def estimate(row, name):
+def estimate(row, name, factor, decimals):
     """Returns a number of a row with its interval as text."""
-    low, high = (cell(row, f"{name}_{end}") for end in ("low", "high"))
-    return cell(row, name) + ("" if "–" in (low, high) else f" [{low}, {high}]")
+    low, high = (number(row.get(f"{name}_{end}"), factor, decimals) for end in ("low", "high"))
+    return text_of(row, name, factor, decimals) + ("" if "–" in (low, high) else f" [{low}, {high}]")
+
+
+def label(row):
+    """Returns case and planner of a row."""
+    return ", ".join(filter(None, (row.get("case"), f"`{row['planner']}`" if row["planner"] else "")))
 
 
 def table(page, name, rows):
@@ -348,9 +401,9 @@ def table(page, name, rows):
         if missing:
             raise Bad(f"{page}: table {name}: no {missing[0]} at commit {rows[0]['commit']}")
         rows = [known[planner] for planner in selection.labels]
-    labels = selection.labels or {row["planner"]: f"`{row['planner']}`" for row in rows}
-    lines = [["planner", *(title for title, _ in selection.columns)], ["---"] * (1 + len(selection.columns))]
-    lines += [[labels[row["planner"]], *(text(row) for _, text in selection.columns)] for row in rows]
+    labels = [*selection.labels.values()] if selection.labels else map(label, rows)
+    lines = [[selection.first, *(title for title, _ in selection.columns)], ["---"] * (1 + len(selection.columns))]
+    lines += [[first, *(text(row) for _, text in selection.columns)] for first, row in zip(labels, rows)]
     return "".join(f"|{'|'.join(line)}|\n" for line in lines) + f"\n{caption(rows)}\n"
 
 
@@ -366,15 +419,16 @@ def all_columns(rows):
         is_shown &= match is None or match[1] == measures[0][1] or int(match[2]) == max(budgets)
         if name in TEXT | IN_CAPTION or name.endswith(("_low", "_high")) or not is_shown:
             continue
-        title = described(name)[0].replace("{reference}", rows[0].get("reference", ""))
+        title, factor, decimals = described(name)
         has_interval = f"{name}_low" in names and not name.startswith("after_")
-        yield title, functools.partial(estimate if has_interval else cell, name=name)
+        yield title.replace("{reference}", rows[0].get("reference", "")), show(name, factor, decimals, has_interval)
 
 
 def caption(rows):
     """Returns a line with the provenance of a table."""
-    row = rows[0]
-    parts = [f"Commit `{row['commit'][:12]}`, {row['date'][:10]}"]
+    row, last = (chosen(rows, key=lambda row: row["date"]) for chosen in (min, max))
+    dated = [f"`{it['commit'][:12]}`, {it['date'][:10]}" for it in (row, last)]
+    parts = [f"Commit {dated[0]}" if row["commit"] == last["commit"] else f"Commits {dated[0]}, to {dated[1]}"]
     parts += [f"SHA-256 `{row['protocol_sha256'][:8]}…`"] if row["protocol_sha256"] else []
     parts += [f"{row['objects']} objects"] if row.get("objects") else []
     trials = sorted({int(row["trials"]) + int(row.get("failures") or 0) for row in rows if row.get("trials")})
@@ -405,7 +459,8 @@ def update(root, is_check):
             return f"<!-- table: {match[1]} -->\n\n{table(page, match[1], results[match[1]])}\n<!-- end -->"
 
         texts[path] = BLOCK.sub(replaced, text)
-    texts[root / FIGURE] = commits_figure.svg({name: panel(rows) for name, rows in results.items()})
+    panels = {name: panel(rows) for name, rows in results.items() if is_protocol(rows)}
+    texts[root / FIGURE] = commits_figure.svg(panels)
     code = 0
     for path, text in texts.items():
         before = path.read_text() if path.exists() else None
@@ -434,12 +489,11 @@ def panel(rows):
     place = {commit: index for index, (_, commit, _) in enumerate(commits)}
     series = {}
     for row in rows:
-        label = ", ".join(filter(None, (row.get("case"), row["planner"])))
         values = [factor * float(row[it]) if row.get(it) else None for it in (name, f"{name}_low", f"{name}_high")]
         if values[0] is not None:
-            series.setdefault(label, []).append((place[row["commit"]], *values))
+            series.setdefault(label(row).replace("`", ""), []).append((place[row["commit"]], *values))
     title = title.replace("{reference}", rows[-1].get("reference", ""))
-    return commits_figure.Panel(title, commits, {label: sorted(points) for label, points in series.items()})
+    return commits_figure.Panel(title, commits, {name: sorted(points) for name, points in series.items()})
 
 
 if __name__ == "__main__":

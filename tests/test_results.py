@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 import xml.dom.minidom
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -134,6 +135,25 @@ class Checkout(unittest.TestCase):
         self.assertIn("|3.04|1.23|0.900|2.00|\n", page)
         self.assertIn("shape: Chamfer, %, after 20", (self.root / results.FIGURE).read_text())
 
+    def test_results_of_other_commands_are_the_newest_of_each_case(self):
+        path = self.root / "benches/results/other.csv"
+        path.parent.mkdir(parents=True)
+        head = "commit,date,protocol_sha256,planner,case,error_m,error_m_low,error_m_high,time_s,time_s_over\n"
+        path.write_text(
+            f"{head}{self.commits[1]},2026-11-21T10:00:00Z,,active,mug,1,,,,9\n"
+            f"{self.commits[0]},2026-11-20T10:00:00Z,,active,mug,2,,,3,\n"
+            f"{self.commits[0]},2026-11-20T10:00:00Z,,,cup,3,-1,4,5,\n"
+        )
+        self.page.write_text("<!-- table: other -->\n<!-- end -->\n")
+        error, time = results.show("error_m", 1000, 0, has_interval=True), results.show("time_s", decimals=0)
+        selection = results.Selection([("error", error), ("s", time)], first="object")
+        with unittest.mock.patch.dict(results.TABLES, {("docs/page.md", "other"): selection}):
+            self.assertEqual(self.run_script("write")[0], 0)
+        rows = "|object|error|s|\n|---|---|---|\n|mug, `active`|1000|over 9|\n|cup|3000 [−1000, 4000]|5|\n"
+        dates = f"Commits `{self.commits[0]}`, 2026-11-20, to `{self.commits[1]}`, 2026-11-21."
+        self.assertIn(f"{rows}\n{dates}\n", self.page.read_text())
+        self.assertNotIn("other", (self.root / results.FIGURE).read_text())
+
     def test_a_new_column_is_empty_in_older_rows(self):
         self.add()
         code, said = self.add(commit=self.commits[1], planners=[planner("active", 0.9) | {"time_s": 2.5}])
@@ -216,7 +236,7 @@ class Parts(unittest.TestCase):
         numbers = {"0.9996": "1.00", "0.0043": "0.00430", "9.996": "10.0", "123.4": "123", "0": "0.00", "": "–"}
         self.assertEqual({value: results.number(value) for value in numbers}, numbers)
         self.assertEqual(results.number("-0.004", 100, 0), "0")
-        self.assertEqual(results.number("-0.014", 100, 0), "-1")
+        self.assertEqual(results.number("-0.014", 100, 0), "−1")
 
     def test_labels_do_not_overlap(self):
         for heights in ([10, 11, 12, 200], [190, 195, 199], [5] * 12, [50, 60, 90, 91, 92, 93]):
