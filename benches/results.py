@@ -29,6 +29,7 @@ import sys
 import commits_figure
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+FOLDER = "benches/results"
 FIGURE = "docs/benchmark-commits.svg"
 PAGES = ("*.md", "docs/*.md", "experiments/*.md")
 
@@ -137,9 +138,12 @@ def main(words=None):
     commands.add_parser("check", help="compare tables and figure with the CSV files")
     arguments = parser.parse_args(words)
     try:
+        results = {path.stem: read(path) for path in sorted((arguments.root / FOLDER).glob("*.csv"))}
+        texts = {}
         for file in getattr(arguments, "files", []):
-            print(append(arguments.root, file))
-        return update(arguments.root, is_check=arguments.command == "check")
+            texts |= append(arguments.root, file, results)
+        # Written only if all of them can be.
+        return update(arguments.root, results, texts, is_check=arguments.command == "check")
     except (Bad, OSError, UnicodeDecodeError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -148,18 +152,17 @@ def main(words=None):
 # Results of a benchmark.
 
 
-def append(root, file):
-    """Appends the rows of a benchmark.json to its protocol's CSV file; returns a line for the terminal."""
+def append(root, file, results):
+    """Appends the rows of a benchmark.json to those of its protocol; returns the CSV file with its text."""
     result = read_result(root, file)
-    rows = rows_of(file, result, commit_date(root, file, result["commit"]))
-    path = root / "benches/results" / f"{result['protocol']}.csv"
-    stored = read(path) if path.exists() else []
+    protocol, commit = result["protocol"], result["commit"]
+    path = root / FOLDER / f"{protocol}.csv"
+    stored = results.get(protocol, [])
     for row in stored:
-        if row["commit"].startswith(result["commit"]) or result["commit"].startswith(row["commit"]):
-            raise Bad(f"{file}: `commit` = {result['commit']} is in {path} already; delete its rows to replace them")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(csv_text(stored + rows))
-    return f"{path}: {len(rows)} planners at {result['commit']}"
+        if row["commit"].startswith(commit) or commit.startswith(row["commit"]):
+            raise Bad(f"{file}: `commit` = {commit} is in {path} already; delete its rows to replace them")
+    results[protocol] = stored + rows_of(file, result, commit_date(root, file, commit))
+    return {path: csv_text(results[protocol])}
 
 
 def read_result(root, file):
@@ -441,11 +444,9 @@ def caption(rows):
 # Pages and figure.
 
 
-def update(root, is_check):
-    """Writes tables and figure, or compares them; returns the exit code."""
-    files = sorted((root / "benches/results").glob("*.csv"))
-    results = {path.stem: read(path) for path in files}
-    texts, shown = {}, set()
+def update(root, results, texts, is_check):
+    """Writes `texts` by file, tables and figure, or compares them; returns the exit code."""
+    shown = set()
     for path in (path for pattern in PAGES for path in sorted(root.glob(pattern))):
         page = path.relative_to(root).as_posix()
         text = path.read_text()
@@ -459,6 +460,7 @@ def update(root, is_check):
             return f"<!-- table: {match[1]} -->\n\n{table(page, match[1], results[match[1]])}\n<!-- end -->"
 
         texts[path] = BLOCK.sub(replaced, text)
+    results = dict(sorted(results.items()))
     panels = {name: panel(rows) for name, rows in results.items() if is_protocol(rows)}
     texts[root / FIGURE] = commits_figure.svg(panels)
     code = 0
@@ -470,6 +472,7 @@ def update(root, is_check):
             print(f"{path} differs from benches/results: run `python3 benches/results.py write`", file=sys.stderr)
             code = 1
         else:
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
             print(f"wrote {path}")
     for name in results.keys() - shown:

@@ -198,6 +198,14 @@ class Checkout(unittest.TestCase):
         self.assertEqual(self.run_script("add", file)[0], 2)
         self.assertEqual(self.run_script("add", self.root / "none.json")[0], 2)
 
+    def test_nothing_is_written_if_a_table_cannot_be(self):
+        selection = results.Selection([("error", results.show("error"))], {"random": "`random`"})
+        with unittest.mock.patch.dict(results.TABLES, {("docs/page.md", "one"): selection}):
+            code, said = self.add()
+        self.assertEqual(code, 2)
+        self.assertIn(f"docs/page.md: table one: no random at commit {self.commits[0]}", said)
+        self.assertFalse((self.root / "benches/results").exists())
+
     def test_a_commit_is_stored_once(self):
         self.add()
         before = self.rows()
