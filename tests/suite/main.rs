@@ -28,6 +28,7 @@ mod check;
 mod collisions;
 mod commands;
 mod compare;
+mod contact_noise;
 mod control;
 mod cost;
 mod detection;

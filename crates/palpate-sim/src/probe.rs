@@ -2,6 +2,7 @@
 
 use crate::Environment;
 use crate::environment::{CLEARANCE_M, ObjectShape};
+use crate::finger::effects::contact_noise::ContactNoiseEffect;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{
@@ -14,11 +15,37 @@ use palpate_explore::task::stroke::{SAMPLE_M, STEEPEST};
 use palpate_explore::task::{Action, Approach};
 use palpate_geometry::bvh::SweepHit;
 use palpate_geometry::sweep::Capsule;
+use palpate_gp::math::seed;
+use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// Returns a probe that touches the environment's surface exactly and at once.
 pub fn exact_probe(environment: Arc<Environment>) -> Box<dyn Probe> {
     Box::new(ExactProbe { environment })
+}
+
+/// Returns a probe that touches the environment's surface at once, with the scene's noise of
+/// contacts, if there is any; `seed` determines it.
+pub fn noisy_probe(environment: Arc<Environment>, seed: u64) -> Box<dyn Probe> {
+    let effect = environment.scene().effects.contact_noise.clone();
+    let probe = exact_probe(environment);
+    let Some(effect) = effect else { return probe };
+    Box::new(NoisyProbe { probe, effect, random: seed::stream(seed, 0, "contact noise") })
+}
+
+/// Probe whose contacts have errors.
+struct NoisyProbe {
+    probe: Box<dyn Probe>,
+    effect: ContactNoiseEffect,
+    random: ChaCha8Rng,
+}
+
+impl Probe for NoisyProbe {
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        let mut outcome = self.probe.execute(action)?;
+        self.effect.add(&mut outcome, &mut self.random);
+        Ok(outcome)
+    }
 }
 
 /// Probe that evaluates the scene's function, or sweeps the finger's hull along the approach to

@@ -5,7 +5,7 @@ use super::kinematic::KinematicBackend;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
 use super::notice;
-use super::probe::exact_probe;
+use super::probe::noisy_probe;
 use crate::Environment;
 use crate::scene::SimulatorKind;
 use palpate_explore::backend::delay::DelayedBackend;
@@ -97,7 +97,7 @@ impl Simulator {
     pub fn probe(&self, seed: u64) -> Result<Box<dyn Probe>, Fault> {
         Ok(match self.body()? {
             Some(body) => Box::new(self.servo(body, seed)?),
-            None => exact_probe(Arc::clone(&self.environment)),
+            None => noisy_probe(Arc::clone(&self.environment), seed),
         })
     }
 

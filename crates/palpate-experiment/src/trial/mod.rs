@@ -232,12 +232,19 @@ fn look(episode: &mut Episode, target: Target, after: u32) -> Result<ViewRow, St
 pub fn hypotheses(
     environment: &Environment,
     library: Arc<Library>,
-    settings: RecognitionSettings,
+    mut settings: RecognitionSettings,
     random: &mut ChaCha8Rng,
 ) -> ObjectHypotheses {
     let scene = environment.scene();
     let prior = scene.pose.clone().unwrap_or_default();
     let (task, surface) = (environment.task(), scene.effects.surface());
+    let noise = scene.effects.contact_noise.as_ref();
+    if let Some(noise) = noise.filter(|noise| noise.normal_sd_deg > 0.0) {
+        // A contact states the error of its place only.
+        let usual = || surface.errors(task.touch().press_m).normal_sd_rad.to_degrees();
+        let usual_deg = settings.normal_sd_deg.unwrap_or_else(usual);
+        settings.normal_sd_deg = Some(usual_deg.hypot(noise.normal_sd_deg).min(180.0));
+    }
     ObjectHypotheses::new(library, prior, settings, task, &surface, random)
 }
 

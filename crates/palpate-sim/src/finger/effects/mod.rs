@@ -6,6 +6,7 @@
 
 pub mod collision;
 pub mod constants;
+pub mod contact_noise;
 pub mod creep;
 pub mod effect;
 pub mod electrodes;
@@ -57,6 +58,8 @@ table::effects! {
     timing: timing::TimingEffect,
     /// Collisions of links, tool, object and table.
     collision: collision::CollisionEffect,
+    /// Noise of the contacts of a finger that does not move.
+    contact_noise: contact_noise::ContactNoiseEffect,
 }
 
 impl Effects {
@@ -84,7 +87,7 @@ impl Effects {
 
     /// Returns every effect with its defaults, except those that another one excludes.
     pub fn all() -> Self {
-        Self { rigid_tip: None, gel: None, ..Self::each() }
+        Self { rigid_tip: None, gel: None, contact_noise: None, ..Self::each() }
     }
 
     /// Returns the surface of the fingertip.
