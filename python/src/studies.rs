@@ -202,11 +202,13 @@ pub(crate) fn benchmark(
         runs.iter().map(|run| (run.get().0.experiment.name.clone(), &run.get().0)).collect();
     let spec = BenchmarkSpec { path: &path, objects: None, is_quick, commit: COMMIT };
     let result = fork::detach(py, || spec.result(&runs))?.map_err(errors::study)?;
-    let table = benchmark_table::table(&result);
+    let tables = benchmark_table::tables(&result);
     let document = serde_json::to_string_pretty(&result).map_err(errors::other)? + "\n";
     let mut values = json!(result);
-    values["text"] = table.text().into();
-    values["html"] = table.html("palpate").into();
+    let text: Vec<String> = tables.iter().map(|(_, table)| table.text()).collect();
+    let html: Vec<String> = tables.iter().map(|(_, table)| table.html("palpate")).collect();
+    values["text"] = text.join("\n").into();
+    values["html"] = html.concat().into();
     values["document"] = document.into();
     Ok(values.to_string())
 }

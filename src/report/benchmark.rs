@@ -1,17 +1,34 @@
-//! Table of a benchmark of planners.
+//! Tables of a benchmark of planners.
 
 use super::table::{Cell, Column, Table};
-use crate::experiment::measure::Direction;
-use crate::study::benchmark::{BenchmarkResult, RelativeError};
+use crate::experiment::measure::{self, Direction, Measure, MeasureUnit};
+use crate::study::benchmark::{BenchmarkResult, PlannerResult, RelativeError};
 use crate::study::check::measures::ERROR_FLOOR_M;
+use crate::study::measure_means::MeasureMeans;
+use crate::study::objects::Rival;
 
 fn judged(error: &RelativeError) -> Cell {
     let cell = Cell::estimate(error.estimate());
     cell.with_verdict(error.error_interval, 1.0, Direction::Minimise)
 }
 
-/// Returns the table with a row for each planner, the smallest error first.
-pub fn table(result: &BenchmarkResult) -> Table {
+/// Returns all tables with their captions: errors relative to the reference planner, then measures.
+pub fn tables(result: &BenchmarkResult) -> Vec<(String, Table)> {
+    let has_errors = !result.reference.is_empty();
+    let errors = has_errors.then(|| (note(result), errors(result)));
+    let objects =
+        if has_errors { format!(" and {} objects", result.objects.len()) } else { String::new() };
+    let all = measures(result, |planner| Some(&planner.means))
+        .map(|table| (format!("Means over trials{objects}. {}", measures_note(result)), table));
+    let others = measures(result, |planner| planner.reporting.as_ref()).map(|table| {
+        let count = result.objects.len() - result.tuned_on.len();
+        (format!("The same over the {count} objects by which no settings were chosen."), table)
+    });
+    errors.into_iter().chain(all).chain(others).collect()
+}
+
+/// Returns the table of errors with a row for each planner, the smallest error first.
+fn errors(result: &BenchmarkResult) -> Table {
     let objects = result.objects.len();
     let first = [
         Column::new("planner"),
@@ -19,13 +36,14 @@ pub fn table(result: &BenchmarkResult) -> Table {
         Column::new("better on"),
         Column::new("worse on"),
         Column::new("gap closed").unit("%", 100.0, 0),
-        Column::new("full zones").unit("%", 100.0, 0),
-        Column::new("open zones").unit("%", 100.0, 0),
     ];
+    // Whole objects have no zones.
+    let zones = ["full zones", "open zones"].map(|name| Column::new(name).unit("%", 100.0, 0));
+    let zones = zones.into_iter().filter(|_| result.measures.is_empty());
     let after = |budget: &u32| Column::new(format!("after {budget}"));
     let last = [Column::new("failed")];
-    let mut table =
-        Table::new(first.into_iter().chain(result.budgets.iter().map(after)).chain(last));
+    let columns = first.into_iter().chain(zones).chain(result.budgets.iter().map(after));
+    let mut table = Table::new(columns.chain(last));
     for planner in &result.planners {
         let name = planner.name.as_str();
         let count = |count: usize| match name == result.reference {
@@ -39,60 +57,138 @@ pub fn table(result: &BenchmarkResult) -> Table {
             count(planner.better_on),
             count(planner.worse_on),
             planner.gap_closed.into(),
-            planner.gap_closed_full.into(),
-            planner.gap_closed_open.into(),
         ];
+        if result.measures.is_empty() {
+            row.extend([planner.gap_closed_full.into(), planner.gap_closed_open.into()]);
+        }
         row.extend(after);
-        row.push(format!("{} of {}", planner.failures, planner.trials + planner.failures).into());
+        row.push(failed(planner.failures, planner.trials));
         table.rows.push(row);
     }
     table
 }
 
-/// Names of measures of a whole object, each with its column, after the last budget.
-const SHAPES: [(&str, &str, f64); 5] = [
-    ("reachable_chamfer_share", "reachable, % of the diagonal", 100.0),
-    ("f_1_mm", "F at 1 mm", 1.0),
-    ("f_2_mm", "F at 2 mm", 1.0),
-    ("reached_2_mm", "reached within 2 mm, %", 100.0),
-    ("iou", "IoU", 1.0),
-];
-
-/// Returns the table of the estimated shapes: the Chamfer distance in percent of the diagonal after
-/// each budget, and other measures after the last; `None` for a protocol of zones.
-pub fn shapes(result: &BenchmarkResult) -> Option<Table> {
-    result.planners.first().filter(|planner| !planner.measures.is_empty())?;
-    let chamfer =
-        |budget: &u32| Column::new(format!("Chamfer, %, after {budget}")).unit("%", 100.0, 2);
-    let other = |(_, title, factor): &(&str, &str, f64)| {
-        Column::new(*title).unit("", *factor, if *factor > 1.0 { 2 } else { 3 })
-    };
-    let columns = result.budgets.iter().map(chamfer).chain(SHAPES.iter().map(other));
-    let mut table = Table::new(std::iter::once(Column::new("planner")).chain(columns));
-    for planner in &result.planners {
-        let after = |name: &str| planner.measures.get(name).cloned().unwrap_or_default();
-        let last = |(name, ..): &(&str, &str, f64)| after(name).last().copied().flatten();
-        let mut row: Vec<Cell> = vec![planner.name.as_str().into()];
-        row.extend(after("chamfer_share").into_iter().map(Cell::from));
-        row.extend(SHAPES.iter().map(last).map(Cell::from));
-        table.rows.push(row);
-    }
-    Some(table)
+fn failed(failures: usize, trials: usize) -> Cell {
+    format!("{failures} of {}", trials + failures).into()
 }
 
-/// Returns the measures of whole objects as CSV: for each object, planner, budget and measure the
-/// mean over trials, in SI units. `None` for a protocol of zones.
-pub fn csv(result: &BenchmarkResult) -> Option<String> {
-    result.planners.first().filter(|planner| !planner.measures.is_empty())?;
-    let mut text = String::from("object,planner,touches,measure,mean,trials\n");
+/// Returns the table of the measures: the first after each budget, the others after the last. It
+/// has a row for each planner, or for each scene of a library and each planner. `None` without
+/// measures.
+fn measures(
+    result: &BenchmarkResult,
+    of: fn(&PlannerResult) -> Option<&MeasureMeans>,
+) -> Option<Table> {
+    let measures: Vec<&Measure> =
+        result.measures.iter().filter_map(|name| measure::by_id(name)).collect();
+    let (first, others) = measures.split_first()?;
+    let last = result.budgets.len().checked_sub(1)?;
+    let is_library = result.reference.is_empty();
+    let column = |measure: &Measure, name: String, title: String| {
+        let MeasureUnit { symbol, per_si, decimals, .. } = measure.unit;
+        Column::new(name).title(title).unit(symbol, per_si, decimals)
+    };
+    let scene = is_library.then(|| Column::new("scene"));
+    let budgets = result.budgets.iter().map(|budget| {
+        column(first, format!("after {budget}"), format!("{} after {budget}", first.title))
+    });
+    let shares = ["left", "gap closed"].map(|name| Column::new(name).unit("%", 100.0, 1));
+    let shares = shares.into_iter().filter(|_| !is_library);
+    let others_columns =
+        others.iter().map(|it| column(it, it.title.to_owned(), it.title.to_owned()));
+    let failures = is_library.then(|| Column::new("failed"));
+    let columns = scene.into_iter().chain([Column::new("planner")]).chain(budgets);
+    let columns = columns.chain(shares).chain(others_columns).chain(failures);
+    let mut table = Table::new(columns);
+    let cells = |means: &MeasureMeans| -> [Vec<Cell>; 2] {
+        let after = |index: usize| match means.get(first.id, index) {
+            found if index == last => Cell::estimate(found),
+            found => Cell::from(found.map(|found| found.value)),
+        };
+        let others = others.iter().map(|it| Cell::estimate(means.get(it.id, last)));
+        [(0..=last).map(after).collect(), others.collect()]
+    };
+    if is_library {
+        for (i, scene) in result.objects.iter().enumerate() {
+            for planner in &result.planners {
+                let on_scene = &planner.objects[i];
+                let mut row = vec![scene.as_str().into(), planner.name.as_str().into()];
+                row.extend(cells(&on_scene.means).concat());
+                row.push(failed(on_scene.failures, on_scene.trials));
+                table.rows.push(row);
+            }
+        }
+        return Some(table);
+    }
     for planner in &result.planners {
-        for object in &planner.objects {
-            for (measure, values) in &object.measures {
-                for (touches, value) in result.budgets.iter().zip(values) {
-                    let value = value.map_or(String::new(), |value| value.to_string());
+        let is_all = of(planner)? == &planner.means;
+        let shares = [planner.left, planner.mean_gap_closed].map(|it| it.filter(|_| is_all));
+        let [after, others] = cells(of(planner)?);
+        let mut row = vec![planner.name.as_str().into()];
+        row.extend(after.into_iter().chain(shares.map(Cell::from)).chain(others));
+        table.rows.push(row);
+    }
+    Some(table.without_empty())
+}
+
+/// Returns the note that explains the columns of the measures.
+fn measures_note(result: &BenchmarkResult) -> String {
+    let measures = result.measures.iter().filter_map(|name| measure::by_id(name));
+    let titles: Vec<&str> = measures.clone().map(|measure| measure.title).collect();
+    let (first, others) = titles.split_first().map_or(("", &[][..]), |(a, b)| (*a, b));
+    let medians: Vec<&str> =
+        measures.filter(|it| !it.aggregate.has_mean()).map(|it| it.title).collect();
+    let medians = match medians.is_empty() {
+        true => String::new(),
+        false => format!(" Medians over trials: {}.", medians.join(", ")),
+    };
+    let last = result.budgets.last().copied().unwrap_or(0);
+    let shares = match (result.reference.is_empty(), result.budgets.first()) {
+        (false, Some(start)) => format!(
+            " Left: the last mean in % of that after {start} touches. Gap closed: share of the way of the \
+             last mean from `random` to `oracle`."
+        ),
+        _ => String::new(),
+    };
+    let others = match others.is_empty() {
+        true => String::new(),
+        false => format!("; after {last}: {}", others.join(", ")),
+    };
+    format!(
+        "After N touches: {first}{others}.{medians}{shares} In brackets: 95 % interval, of Wilson for \
+         shares of trials, else of a bootstrap over trials."
+    )
+}
+
+/// Returns the results of other systems as a table; `None` without any.
+fn rivals(result: &BenchmarkResult) -> Option<Table> {
+    let mut table = Table::new(["system", "figure", "source", "differences"].map(Column::new));
+    let row = |Rival { system, figure, source, differs }: &Rival| {
+        [system, figure, source, differs].map(|text| Cell::from(text.as_str())).to_vec()
+    };
+    table.rows = result.rivals.iter().map(row).collect();
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// Returns the measures as CSV: for each object, planner, budget and measure the mean over trials
+/// with its 95 % interval, in SI units. `None` for a protocol without measures.
+pub fn csv(result: &BenchmarkResult) -> Option<String> {
+    if result.measures.is_empty() {
+        return None;
+    }
+    let mut text = String::from("object,planner,touches,measure,mean,low,high,trials\n");
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+    for planner in &result.planners {
+        for on in &planner.objects {
+            for measure in &result.measures {
+                for (i, touches) in result.budgets.iter().enumerate() {
+                    let found = on.means.get(measure, i);
+                    let value = number(found.map(|it| it.value));
+                    let ends = found.and_then(|it| it.interval);
+                    let [low, high] = [0, 1].map(|i| number(ends.map(|ends| ends[i])));
                     text += &format!(
-                        "{},{},{touches},{measure},{value},{}\n",
-                        object.object, planner.name, object.trials
+                        "{},{},{touches},{measure},{value},{low},{high},{}\n",
+                        on.object, planner.name, on.trials
                     );
                 }
             }
@@ -101,41 +197,44 @@ pub fn csv(result: &BenchmarkResult) -> Option<String> {
     Some(text)
 }
 
-/// Returns the table as Markdown, with what is needed to compare it with another one.
+/// Returns the tables as Markdown, with what is needed to compare them with others.
 pub fn markdown(result: &BenchmarkResult) -> String {
     let BenchmarkResult { protocol, protocol_sha256, palpate, commit, .. } = result;
     let quick = match result.quick {
         true => "Quick variant, a part of the protocol: to try out only, not comparable.\n\n",
         false => "",
     };
-    let shapes = shapes(result).map_or(String::new(), |table| {
-        let measures = "Means over trials and objects. Chamfer: mean of the mean distances true → \
-                        estimated and estimated → true; reachable: mean distance of the surface that the \
-                        finger can touch.";
-        format!("\n{}\n{measures}\n", table.markdown())
+    let objects = if result.reference.is_empty() { "scenes" } else { "objects" };
+    let tables = tables(result).into_iter();
+    let tables: Vec<String> =
+        tables.map(|(note, table)| format!("{}\n{note}\n", table.markdown())).collect();
+    let rivals = rivals(result).map_or(String::new(), |table| {
+        format!("\nOther systems, on tasks that differ:\n\n{}", table.markdown())
     });
     format!(
         "Palpate benchmark, protocol {protocol} (SHA-256 {protocol_sha256}), Palpate {palpate} (commit \
-         {commit}). {} objects, {} trials of each planner on each, {} initial and {} planned \
-         touches.\n\n{quick}{}\n{}\n{shapes}",
+         {commit}). {} {objects}, {} trials of each planner on each, {} initial and {} planned \
+         touches.\n\n{quick}{}{rivals}",
         result.objects.len(),
         result.trials,
         result.initial_touches,
         result.touches - result.initial_touches,
-        table(result).markdown(),
-        note(result),
+        tables.join("\n"),
     )
 }
 
-/// Returns the note that explains the columns.
+/// Returns the note that explains the columns of the errors.
 fn note(result: &BenchmarkResult) -> String {
     let against = &result.reference;
+    let zones = match result.measures.is_empty() {
+        true => "; also over the zones that their object fills, and over those that it leaves open",
+        false => "",
+    };
     format!(
         "Error: exp(mean log error over the touches after the initial ones), relative to `{against}` in \
          the same trial; geometric mean over trials and objects, with the 95 % interval of a bootstrap \
          over trials. Less is better; better and worse on: objects whose interval excludes 1. Gap \
-         closed: share of the way from `random` to `oracle`, which uses the ground truth; also over the \
-         zones that their object fills, and over those that it leaves open. After N: error after N \
+         closed: share of the way from `random` to `oracle`, which uses the ground truth{zones}. After N: error after N \
          touches, relative to that of `{against}`. Errors below {:.0} µm count as that. A failed trial counts \
          with its last belief to the end.",
         1e6 * ERROR_FLOOR_M

@@ -7,7 +7,7 @@ use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::decimate::decimate;
-use palpate_geometry::import::{import, is_mesh_file};
+use palpate_geometry::import::import;
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::math::pose::pose;
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,15 +27,13 @@ impl LibraryMeshes {
                 [found.pose.object.as_str()].into_iter().chain(truth)
             })
             .collect();
-        let entries = std::fs::read_dir(&*library.folder).ok()?;
-        let mut paths: Vec<PathBuf> = entries.filter_map(|it| Some(it.ok()?.path())).collect();
-        paths.retain(|path| is_mesh_file(path));
-        let mesh = |path: &PathBuf| {
-            let name = path.file_stem()?.to_str().filter(|name| names.contains(name))?;
-            let (mesh, _) = import(path, library.unit.metres_per_unit()).ok()?;
-            Some((name.to_owned(), mesh))
+        let files = library.files().ok()?.into_iter().flatten();
+        let mesh = |(name, path): (String, PathBuf)| {
+            let (mesh, _) = import(&path, library.unit.metres_per_unit()).ok()?;
+            Some((name, mesh))
         };
-        let meshes: BTreeMap<String, Mesh> = paths.iter().filter_map(mesh).collect();
+        let files = files.filter(|(name, _)| names.contains(name.as_str()));
+        let meshes: BTreeMap<String, Mesh> = files.filter_map(mesh).collect();
         (!meshes.is_empty()).then_some(Self(meshes))
     }
 

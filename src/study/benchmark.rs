@@ -4,14 +4,19 @@
 //! files that it names, so results of different protocols cannot be taken for each other.
 
 use super::check::measures::ERROR_FLOOR_M;
-use super::compare::{Entrant, SuiteComparison, compare, gap_closed, geometric_mean, name_objects};
-use super::objects;
+use super::compare::{
+    BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, compare, gap_closed, geometric_mean,
+    name_objects,
+};
+use super::measure_means::MeasureMeans;
+use super::objects::{self, ObjectProtocol, Rival};
 use super::run::cells;
 use crate::experiment::Experiment;
-use crate::experiment::measure::{self, Measure};
+use crate::experiment::measure::{Direction, Measure};
+use crate::experiment::planner_names::ORACLE;
 use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
-use crate::experiment::statistics::{mean, median};
+use crate::experiment::statistics::median;
 use crate::experiment::store::Run;
 use palpate_input::error::InputError;
 use palpate_input::files;
@@ -19,8 +24,8 @@ use palpate_input::format::hex;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::borrow::Borrow;
-use std::collections::{BTreeMap, HashMap};
-use std::path::{Path, PathBuf};
+use std::collections::HashMap;
+use std::path::Path;
 
 /// Default protocol, a file in `experiments/suite`. A changed protocol is a new file.
 pub const PROTOCOL: &str = "benchmark-3";
@@ -50,10 +55,19 @@ pub struct BenchmarkResult {
     pub palpate: String,
     /// Commit of the build.
     pub commit: String,
-    /// Planner whose errors are the unit.
+    /// Planner whose errors are the unit; empty for a library, which has no errors of shapes.
     pub reference: String,
-    /// Names of the objects.
+    /// Names of the objects, or of the scenes of a library.
     pub objects: Vec<String>,
+    /// Objects by which settings were chosen.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tuned_on: Vec<String>,
+    /// Names of the reported measures, the most important first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub measures: Vec<&'static str>,
+    /// Results of other systems.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rivals: Vec<Rival>,
     /// Trials per planner and object.
     pub trials: u32,
     /// Seed of the trials.
@@ -93,9 +107,20 @@ pub struct PlannerResult {
     pub trials: usize,
     /// Failed trials on all objects; they have no error.
     pub failures: usize,
-    /// Mean over the objects of each measure of a whole object after each budget.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub measures: BTreeMap<&'static str, Vec<Option<f64>>>,
+    /// Means of the measures over the objects.
+    #[serde(flatten)]
+    pub means: MeasureMeans,
+    /// Means over the objects by which no settings were chosen, if there are others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reporting: Option<MeasureMeans>,
+    /// Mean of the first measure after the last budget, divided by that after the first budget; for
+    /// whole objects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left: Option<f64>,
+    /// Share of the way from `random` to the oracle, in the mean of the first measure after the
+    /// last budget; for whole objects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_gap_closed: Option<f64>,
     /// Results on each object.
     pub objects: Vec<PlannerOnObject>,
 }
@@ -114,9 +139,9 @@ pub struct PlannerOnObject {
     pub trials: usize,
     /// Failed trials.
     pub failures: usize,
-    /// Mean of each measure of a whole object after each budget, by its name in files.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub measures: BTreeMap<&'static str, Vec<Option<f64>>>,
+    /// Means of the measures.
+    #[serde(flatten)]
+    pub means: MeasureMeans,
 }
 
 /// Error relative to the reference with its 95 % bootstrap interval; both `None` without a trial.
@@ -194,6 +219,8 @@ pub struct BenchmarkSource<'a> {
     pub quick: bool,
     /// Commit of the build.
     pub commit: &'a str,
+    /// Objects of the protocol, if they are not shipped.
+    pub objects: Option<&'a ObjectProtocol>,
 }
 
 /// Protocol of the study, and the program that runs it.
@@ -211,8 +238,9 @@ pub struct BenchmarkSpec<'a> {
 /// Number of scenes, and the settings, of the quick variant.
 const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 
-/// Settings of the quick variant of a protocol with the user's objects, which has all objects.
-const QUICK_OBJECTS: [&str; 2] = ["trials=1", "touches=20"];
+/// Settings of the quick variants of a protocol with the user's objects, which have all objects.
+const QUICK_SHAPES: [&str; 2] = ["trials=1", "touches=20"];
+const QUICK_LIBRARY: [&str; 2] = ["trials=4", "touches=5"];
 
 impl BenchmarkSpec<'_> {
     /// Loads the experiments of the protocol, one per object, with `planners` beside its own.
@@ -221,12 +249,10 @@ impl BenchmarkSpec<'_> {
     /// If the protocol or an object cannot be read, or a planner is not one.
     pub fn experiments(&self, planners: &[String]) -> anyhow::Result<Vec<Experiment>> {
         if let Some((protocol, folder)) = objects::protocol(self.path, self.objects)? {
-            let sets = QUICK_OBJECTS.map(String::from);
+            let quick = if protocol.is_library() { QUICK_LIBRARY } else { QUICK_SHAPES };
+            let sets = quick.map(String::from);
             let sets = if self.is_quick { &sets[..] } else { &[] };
-            let load = |(name, mesh): &(String, PathBuf)| {
-                protocol.experiment((name, mesh), sets, planners)
-            };
-            return protocol.meshes(folder)?.iter().map(load).collect();
+            return protocol.experiments(folder, sets, planners);
         }
         let sets = if self.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
         let mut experiments = cells(self.path, &sets, planners)?.experiments;
@@ -242,7 +268,11 @@ impl BenchmarkSpec<'_> {
     /// # Errors
     /// If a file of the protocol cannot be read, or the runs do not belong together.
     pub fn result<R: Borrow<Run>>(&self, runs: &[(String, R)]) -> anyhow::Result<BenchmarkResult> {
-        let mut compared = compare(runs, REFERENCE)?;
+        let protocol = ObjectProtocol::read(self.path)?;
+        let mut compared = match protocol.as_ref().is_some_and(ObjectProtocol::is_library) {
+            true => without_errors(runs),
+            false => compare(runs, REFERENCE)?,
+        };
         let name = self.path.file_stem().unwrap_or_default().to_string_lossy();
         name_objects(&mut compared, &name);
         let source = BenchmarkSource {
@@ -250,9 +280,24 @@ impl BenchmarkSpec<'_> {
             protocol_sha256: protocol_sha256(self.path)?,
             quick: self.is_quick,
             commit: self.commit,
+            objects: protocol.as_ref(),
         };
         let runs: Vec<&Run> = runs.iter().map(|(_, run)| run.borrow()).collect();
         Ok(summarise(source, &runs, &compared))
+    }
+}
+
+/// Returns the planners and scenes of runs on a library, whose trials have no errors of shapes.
+fn without_errors<R: Borrow<Run>>(runs: &[(String, R)]) -> SuiteComparison {
+    let experiments: Vec<&Experiment> =
+        runs.iter().map(|(_, it)| &it.borrow().experiment).collect();
+    let results = vec![ObjectResult::default(); runs.len()];
+    let entrant = |name: &String| Entrant { name: name.clone(), results: results.clone() };
+    let planners = experiments.first().map_or(&[][..], |experiment| &experiment.planners[..]);
+    SuiteComparison {
+        reference: String::new(),
+        objects: experiments.iter().map(|experiment| experiment.name.clone()).collect(),
+        contenders: planners.iter().map(entrant).collect(),
     }
 }
 
@@ -266,9 +311,23 @@ pub fn summarise<R: Borrow<Run>>(
     let experiment = runs.first().map(|run| &run.experiment);
     let budgets = experiment.map_or(Vec::new(), Experiment::table_touch_counts);
     let count = |of: fn(&Experiment) -> u32| experiment.map_or(0, of);
-    let mut planners: Vec<PlannerResult> =
-        compared.contenders.iter().map(|it| planner(it, &runs, compared, &budgets)).collect();
-    let order = |it: &PlannerResult| it.error.error.unwrap_or(f64::INFINITY);
+    let measures = source.objects.map_or(Vec::new(), ObjectProtocol::measures);
+    let tuned_on = source.objects.map_or(&[][..], ObjectProtocol::tuned_on);
+    let is_tuned_on: Vec<bool> = compared.objects.iter().map(|it| tuned_on.contains(it)).collect();
+    let mut planners: Vec<PlannerResult> = (compared.contenders.iter())
+        .map(|it| planner(it, &runs, compared, &budgets, (&measures, &is_tuned_on)))
+        .collect();
+    let (last, is_library) = (budgets.len().saturating_sub(1), compared.reference.is_empty());
+    let first = measures.first().copied();
+    if let Some(first) = first.filter(|_| !is_library) {
+        add_shares(&mut planners, first, last);
+    }
+    let value = |it: &PlannerResult| {
+        let first = first.filter(|_| is_library)?;
+        let sign = if first.direction == Direction::Maximise { -1.0 } else { 1.0 };
+        Some(sign * it.means.get(first.id, last)?.value)
+    };
+    let order = |it: &PlannerResult| it.error.error.or_else(|| value(it)).unwrap_or(f64::INFINITY);
     planners.sort_by(|a, b| order(a).total_cmp(&order(b)));
     BenchmarkResult {
         protocol: source.protocol,
@@ -278,6 +337,9 @@ pub fn summarise<R: Borrow<Run>>(
         commit: source.commit.into(),
         reference: compared.reference.clone(),
         objects: compared.objects.clone(),
+        tuned_on: tuned_on.to_vec(),
+        measures: measures.iter().map(|measure| measure.id).collect(),
+        rivals: source.objects.map_or(Vec::new(), |it| it.rivals().to_vec()),
         trials: count(|it| it.trials),
         seed: experiment.map_or(0, |it| it.seed),
         initial_touches: count(|it| it.initial_touches),
@@ -287,14 +349,30 @@ pub fn summarise<R: Borrow<Run>>(
     }
 }
 
+/// Adds the share of the first measure that is left, and that of the gap that is closed.
+fn add_shares(planners: &mut [PlannerResult], first: &Measure, last: usize) {
+    let mean = |it: &PlannerResult, index| Some(it.means.get(first.id, index)?.value);
+    let named =
+        |name: &str| planners.iter().find(|it| it.name == name).and_then(|it| mean(it, last));
+    let ends = named(BASELINE_PLANNER).zip(named(ORACLE)).filter(|(floor, top)| floor != top);
+    for planner in planners {
+        let after = mean(planner, last);
+        planner.left = after.zip(mean(planner, 0)).map(|(after, before)| after / before);
+        planner.mean_gap_closed =
+            after.zip(ends).map(|(own, (floor, top))| (floor - own) / (floor - top));
+    }
+}
+
 fn planner(
     entrant: &Entrant,
     runs: &[&Run],
     compared: &SuiteComparison,
     budgets: &[u32],
+    (measures, is_tuned_on): (&[&'static Measure], &[bool]),
 ) -> PlannerResult {
-    let on_object = |(object, run): (&String, &&Run), scores: &[f64]| {
-        let rows: Vec<&TrialRow> = planner_rows(&run.rows, &entrant.name).collect();
+    let all: Vec<Vec<&TrialRow>> =
+        runs.iter().map(|run| planner_rows(&run.rows, &entrant.name).collect()).collect();
+    let on_object = |((object, run), rows): ((&String, &&Run), &Vec<&TrialRow>), scores: &[f64]| {
         let failures = rows.iter().filter(|row| row.failure.is_some()).count();
         let after = |&budget: &u32| {
             let errors: Vec<f64> = errors_m(run, &entrant.name, budget).into_values().collect();
@@ -304,12 +382,12 @@ fn planner(
             object: object.clone(),
             error: RelativeError::new(&[scores]),
             error_m: budgets.iter().map(after).collect(),
-            measures: shape_means(run, &rows, budgets),
+            means: MeasureMeans::new(measures, std::slice::from_ref(rows), budgets),
             trials: rows.len() - failures,
             failures,
         }
     };
-    let objects: Vec<PlannerOnObject> = (compared.objects.iter().zip(runs))
+    let objects: Vec<PlannerOnObject> = (compared.objects.iter().zip(runs).zip(&all))
         .zip(entrant.scores())
         .map(|(object, scores)| on_object(object, scores))
         .collect();
@@ -334,57 +412,16 @@ fn planner(
         after: budgets.iter().map(|&budget| after(entrant, runs, compared, budget)).collect(),
         trials: objects.iter().map(|object| object.trials).sum(),
         failures: objects.iter().map(|object| object.failures).sum(),
-        measures: means_over(&objects, budgets.len()),
+        means: MeasureMeans::new(measures, &all, budgets),
+        reporting: is_tuned_on.contains(&true).then(|| {
+            let others = all.into_iter().zip(is_tuned_on).filter(|(_, is_tuned_on)| !**is_tuned_on);
+            let others: Vec<Vec<&TrialRow>> = others.map(|(rows, _)| rows).collect();
+            MeasureMeans::new(measures, &others, budgets)
+        }),
+        left: None,
+        mean_gap_closed: None,
         objects,
     }
-}
-
-/// Measures of a whole object in a benchmark.
-const SHAPE_MEASURES: [&str; 7] = [
-    "chamfer_share",
-    "reachable_chamfer_share",
-    "f_1_mm",
-    "f_2_mm",
-    "reached_2_mm",
-    "iou",
-    "volume_error",
-];
-
-/// Mean of each measure of a whole object over trials, after each budget; empty for a zone.
-fn shape_means(
-    run: &Run,
-    rows: &[&TrialRow],
-    budgets: &[u32],
-) -> BTreeMap<&'static str, Vec<Option<f64>>> {
-    if run.experiment.scene.whole_object.is_none() {
-        return BTreeMap::new();
-    }
-    let measures = SHAPE_MEASURES.into_iter().filter_map(measure::by_id);
-    let after = |measure: &Measure| {
-        let mean_after =
-            |budget: &u32| known_mean(rows.iter().filter_map(|row| measure.value(row, *budget)));
-        budgets.iter().map(mean_after).collect()
-    };
-    measures.map(|measure| (measure.id, after(measure))).collect()
-}
-
-/// Means over the objects that have a value.
-fn means_over(
-    objects: &[PlannerOnObject],
-    budgets: usize,
-) -> BTreeMap<&'static str, Vec<Option<f64>>> {
-    let names = objects.first().map(|object| object.measures.keys()).into_iter().flatten();
-    let after = |name: &'static str| {
-        let values =
-            |i: usize| objects.iter().filter_map(move |it| *it.measures.get(name)?.get(i)?);
-        (0..budgets).map(|i| known_mean(values(i))).collect()
-    };
-    names.map(|name| (*name, after(name))).collect()
-}
-
-fn known_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let values: Vec<f64> = values.collect();
-    (!values.is_empty()).then(|| mean(&values))
 }
 
 /// Error of a planner after some touches, relative to the reference in the same trial.

@@ -280,7 +280,7 @@ fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
 
 /// Statistic of all trials of strata of these sizes, with the 95 % interval of a bootstrap within
 /// each stratum; deterministic for a `seed` and `purpose`.
-fn estimate(
+pub(super) fn estimate(
     sizes: &[usize],
     seed: u64,
     purpose: &str,

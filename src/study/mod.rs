@@ -8,6 +8,7 @@
 //! * [`compare`](mod@compare): comparison of planners over several runs.
 //! * [`export`]: choice of the belief that is exported.
 //! * [`identify`]: an object of a library, identified by touch.
+//! * [`measure_means`]: means of measures over trials and objects.
 //! * [`planners`]: planners that are added to those of an experiment.
 //! * [`run`]: runs in folders, and the comparison of a sweep's runs.
 //! * [`sensors`]: the same experiment with every kind of fingertip.
@@ -20,6 +21,7 @@ pub mod check;
 pub mod compare;
 pub mod export;
 pub mod identify;
+pub mod measure_means;
 pub mod objects;
 pub mod planners;
 pub mod run;

@@ -1,8 +1,6 @@
 //! Tests of `palpate benchmark`: its protocol, its results, and that it can be continued.
 
 use crate::common::program::{fails, palpate, succeeds};
-use crate::common::shapes::box_mesh;
-use nalgebra::Point3;
 use palpate::experiment::runner;
 use palpate::experiment::store::{Run, RunFolder};
 use palpate::experiment::sweep::sweep_cases;
@@ -15,11 +13,8 @@ use palpate::study::benchmark::{
     BenchmarkResult, BenchmarkSource, PROTOCOL, REFERENCE, protocol_sha256, summarise,
 };
 use palpate::study::compare::compare;
-use palpate::study::objects::ObjectProtocol;
-use palpate_input::format::hex;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -121,6 +116,7 @@ fn small() -> BenchmarkResult {
         protocol_sha256: "it".into(),
         quick: true,
         commit: "unknown",
+        objects: None,
     };
     summarise(source, &runs, &compared)
 }
@@ -196,92 +192,4 @@ fn a_quick_benchmark_runs_and_continues() {
     let unknown = [&run[..], &["--planner", "actve"]].concat();
     fails(root, &unknown, &["actve", "active"]);
     assert!(!palpate(root, &["benchmark", "--trials", "3"]).status.success());
-}
-
-/// A cube as OBJ.
-fn cube(size: f64) -> String {
-    let mesh = box_mesh(Point3::origin(), Point3::new(size, size, size));
-    let vertices = mesh.vertices().iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
-    let corners = mesh.triangles().iter().map(|corners| corners.map(|i| i + 1));
-    let faces = corners.map(|[a, b, c]| format!("f {a} {b} {c}\n"));
-    vertices.chain(faces).collect()
-}
-
-/// The shipped protocol on YCB has settings and planners for whole objects, of which one is the
-/// reference.
-#[test]
-fn the_protocol_on_ycb_runs_on_any_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let mesh = folder.path().join("cube.obj");
-    fs::write(&mesh, cube(0.05)).unwrap();
-    let path = Path::new("experiments/suite/ycb-shape.toml");
-    let protocol = ObjectProtocol::read(path).unwrap().unwrap();
-    let experiment = protocol.experiment(("cube", &mesh), &[], &[]).unwrap();
-    assert_eq!(experiment.name, "ycb-shape-cube");
-    assert!(experiment.planners.iter().any(|planner| planner == REFERENCE));
-    let simulation = Simulation::new(experiment).unwrap();
-    assert!(simulation.experiment().planners.iter().all(|it| simulation.planner(it).is_some()));
-    let unknown = protocol.meshes(folder.path()).unwrap_err().to_string();
-    assert!(unknown.contains("78 of 78 objects"), "{unknown}");
-}
-
-/// A protocol on objects of a folder: what is missing or differs is named, each object is explored
-/// all around, and the result has its measures.
-#[test]
-fn a_protocol_runs_on_the_meshes_of_a_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, text).unwrap();
-    };
-    for (name, size) in [("small", 0.04), ("large", 0.06)] {
-        write(&format!("meshes/{name}/textured.obj"), &cube(size));
-    }
-    let sha256 = |size: f64| hex(Sha256::digest(cube(size)));
-    let protocol = format!(
-        "name = \"cubes\"\nplanners = [\"sobol\", \"random\"]\ntrials = 2\ninitial_touches = 3\ntouches = 6\n\
-         [report]\ntouch_counts = [5, 6]\n\
-         [objects]\nsource = \"https://example.org/cubes\"\nunit = \"m\"\nup = \"z\"\n[objects.sha256]\n\
-         \"small/textured.obj\" = \"{}\"\n\"large/textured.obj\" = \"{}\"\n",
-        sha256(0.04),
-        sha256(0.05)
-    );
-    write("cubes.toml", &protocol);
-    let run = ["benchmark", "cubes.toml", "--objects", "meshes"];
-    fails(folder.path(), &run[..2], &["not shipped", "https://example.org/cubes", "--objects"]);
-    let differs = ["1 of 2 objects", "large/textured.obj: other contents", "https://example.org"];
-    fails(folder.path(), &run, &differs);
-    fails(folder.path(), &["run", "cubes.toml"], &["palpate benchmark"]);
-    let shipped = ["benchmark", "--objects", "meshes"];
-    fails(folder.path(), &shipped, &["--objects applies only", "benchmark-3"]);
-    write("cubes.toml", &protocol.replace(&sha256(0.05), &sha256(0.06)));
-    fs::remove_file(folder.path().join("meshes/small/textured.obj")).unwrap();
-    fails(folder.path(), &run, &["small/textured.obj: ", "1 of 2"]);
-    write("meshes/small/textured.obj", &cube(0.04));
-    succeeds(folder.path(), &run);
-    let out = folder.path().join("runs/cubes");
-    let text = fs::read_to_string(out.join("benchmark.json")).unwrap();
-    let result: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(result["objects"], serde_json::json!(["large", "small"]));
-    let resolved = fs::read_to_string(out.join("cubes-small/resolved.toml")).unwrap();
-    assert!(resolved.contains("[scene.whole_object]"), "{resolved}");
-    // The mean over objects of the means over trials, as in the rows.
-    let planner = &result["planners"][0];
-    let runs =
-        ["large", "small"].map(|name| Run::read(&out.join(format!("cubes-{name}"))).unwrap());
-    let chamfer = |run: &Run| {
-        let rows = run.rows.iter().filter(|row| row.planner == planner["name"].as_str().unwrap());
-        let values: Vec<f64> =
-            rows.map(|row| row.touches[5].shape.unwrap().chamfer_share.unwrap()).collect();
-        values.iter().sum::<f64>() / 2.0
-    };
-    let mean = 0.5 * (chamfer(&runs[0]) + chamfer(&runs[1]));
-    let found = planner["measures"]["chamfer_share"][1].as_f64().unwrap();
-    assert!((found - mean).abs() < 1e-12, "{found} {mean}");
-    let csv = fs::read_to_string(out.join("benchmark.csv")).unwrap();
-    assert_eq!(csv.lines().next(), Some("object,planner,touches,measure,mean,trials"));
-    assert_eq!(csv.lines().count(), 1 + 2 * 2 * 2 * 7);
-    let markdown = fs::read_to_string(out.join("benchmark.md")).unwrap();
-    assert!(markdown.contains("Chamfer, %, after 6") && markdown.contains("protocol cubes"));
 }

@@ -19,6 +19,7 @@ mod backend_settings;
 mod band;
 mod bench;
 mod benchmark;
+mod benchmark_objects;
 mod broken;
 mod calibration;
 mod camera;

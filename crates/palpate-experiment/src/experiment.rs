@@ -89,7 +89,7 @@ pub struct Experiment {
 }
 
 /// Key of the table that defines several experiments in one file.
-pub(super) const SWEEP: &str = "sweep";
+pub const SWEEP: &str = "sweep";
 
 /// Folder of the shipped scenes.
 pub const SCENES: &str = "scenes";

@@ -5,7 +5,7 @@ use super::placement::plausible_units;
 use super::scene::{ObjectSettings, Scene, Unit};
 use nalgebra::{Isometry3, Vector3};
 use palpate_explore::recognition::{Library, LibraryObject, PosePrior, Turn};
-use palpate_geometry::import::{import, is_mesh_file};
+use palpate_geometry::import::import;
 use palpate_gp::math::pose::parts;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
@@ -80,30 +80,8 @@ impl LoadedLibrary {
     /// # Errors
     /// If the folder cannot be read, lacks an object or has no mesh, or a mesh cannot be read.
     pub fn read(settings: &LibrarySettings) -> Result<Self, InputError> {
-        let LibrarySettings { folder, unit, objects, unknown, has_classes } = settings;
-        let failed = |words: String| InputError::new(words).at("library.folder");
-        let entries = std::fs::read_dir(folder)
-            .map_err(|error| failed(format!("{}: {error}", folder.display())))?;
-        let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-        let mut files: Vec<(String, PathBuf)> = (paths.filter(|path| is_mesh_file(path)))
-            .map(|path| (path.file_stem().unwrap_or_default().to_string_lossy().into(), path))
-            .collect();
-        files.sort();
-        if files.is_empty() {
-            let formats = "at least one .obj, .gltf, .glb, .stl or .ply file";
-            return Err(failed(format!("{} has no mesh; allowed is {formats}", folder.display())));
-        }
-        let names = || files.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-        for (key, listed) in [("objects", objects), ("unknown", unknown)] {
-            let lacks = |name: &&String| !files.iter().any(|(known, _)| known == *name);
-            if let Some(name) = listed.iter().find(lacks) {
-                let words = format!("\"{name}\" is no mesh of the folder; allowed are {}", names());
-                return Err(InputError::new(words).at(format!("library.{key}")));
-            }
-        }
-        let is_known = |name: &String| {
-            !unknown.contains(name) && (objects.is_empty() || objects.contains(name))
-        };
+        let LibrarySettings { unit, has_classes, .. } = settings;
+        let [known, unknown] = settings.files()?;
         let mut content = Sha256::new();
         let mut read = |(name, path): &(String, PathBuf)| {
             let (mesh, report) = import(path, unit.metres_per_unit())?;
@@ -113,13 +91,10 @@ impl LoadedLibrary {
             check_size(2.0 * object.radius_m(), *unit).map_err(|error| error.at(path.display()))?;
             Ok((path.clone(), Arc::new(object)))
         };
-        let mut chosen = |is_chosen: &dyn Fn(&String) -> bool| {
-            files.iter().filter(|(name, _)| is_chosen(name)).map(&mut read).collect()
-        };
-        let mut all: Vec<(PathBuf, Arc<LibraryObject>)> = chosen(&is_known)?;
+        let mut all = known.iter().map(&mut read).collect::<Result<Vec<_>, InputError>>()?;
         let known = all.iter().map(|(_, object)| Arc::clone(object)).collect();
         let known = Library::new(known).map_err(|error| error.at("library"))?;
-        let others: Result<Vec<_>, InputError> = chosen(&|name| unknown.contains(name));
+        let others: Result<Vec<_>, InputError> = unknown.iter().map(&mut read).collect();
         all.extend(others?);
         let sha256 = hex(content.finalize());
         Ok(Self { known: Arc::new(known), all, unit: *unit, sha256 })

@@ -235,7 +235,8 @@ impl Validate for Scene {
         let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
         forbid_given(rules, "effects.collision", bumps, allowed);
         let is_sensed = self.simulator.moves_finger() && self.effects.contact_noise.is_some();
-        let allowed = "no contact_noise: only simulator = \"swept\" and \"analytic\" have exact contacts";
+        let allowed =
+            "no contact_noise: only simulator = \"swept\" and \"analytic\" have exact contacts";
         forbid_given(rules, "effects.contact_noise", is_sensed, allowed);
         self.check_detection(rules);
         self.object.iter().for_each(|object| rules.table("object", object));
