@@ -212,9 +212,9 @@ class BenchmarkResult(_Study):
         protocol: name of the protocol.
         protocol_sha256: hash of the protocol's files. Results can be compared if name and hash are equal.
         quick: whether objects and trials were left out, so that the result cannot be compared.
-        reference: planner whose errors are the unit.
-        objects: names of the objects.
-        planners: names of the planners, the smallest error first.
+        reference: planner whose errors are the unit; empty for a library, which has no errors of shapes.
+        objects: names of the objects, or of the scenes of a library.
+        planners: names of the planners, the best first.
         trials: trials per planner and object.
         touches: touches of a trial, initial ones included.
     """
@@ -244,7 +244,9 @@ class BenchmarkResult(_Study):
             for budget, it in zip(found["budgets"], after, strict=True):
                 key = f"error_after_{budget}"
                 later |= {key: it["error"], **_ends(key, it["error_interval"])}
-            later |= _after(found["budgets"], planner.pop("measures", {}))
+            others = planner.pop("reporting", {})
+            later |= _after(found["budgets"], planner)
+            later |= {f"reporting_{key}": value for key, value in _after(found["budgets"], others).items()}
             rows.append({"planner": name, **own, **planner, **later})
             for it in on_objects:
                 ends = _ends("error", it.pop("error_interval"))
@@ -252,7 +254,7 @@ class BenchmarkResult(_Study):
                     f"after_{budget}_m": error_m
                     for budget, error_m in zip(found["budgets"], it.pop("error_m"), strict=True)
                 }
-                shapes = _after(found["budgets"], it.pop("measures", {}))
+                shapes = _after(found["budgets"], it)
                 per_object.append({"planner": name, **it, **ends, **medians, **shapes})
         names = ("protocol", "protocol_sha256", "quick", "reference", "trials", "touches")
         return cls(
@@ -349,13 +351,15 @@ def _ends(name: str, interval: list[float] | None) -> dict[str, float | None]:
     return {f"{name}_low": low, f"{name}_high": high}
 
 
-def _after(budgets: list[int], measures: Mapping[str, list[float | None]]) -> dict[str, float | None]:
-    """Returns the values of measures after some touches as columns."""
-    return {
-        f"{name}_after_{budget}": value
-        for name, values in measures.items()
-        for budget, value in zip(budgets, values, strict=True)
-    }
+def _after(budgets: list[int], means: dict[str, Any]) -> dict[str, float | None]:
+    """Removes the measures from `means`; returns their values after some touches, with intervals, as columns."""
+    columns: dict[str, float | None] = {}
+    intervals = means.pop("measure_intervals", {})
+    for name, values in means.pop("measures", {}).items():
+        for budget, value, interval in zip(budgets, values, intervals[name], strict=True):
+            key = f"{name}_after_{budget}"
+            columns |= {key: value, **_ends(key, interval)}
+    return columns
 
 
 #: Parts of a difference without its unit.

@@ -195,7 +195,7 @@ def benchmark(
         planners: planners beside those of the protocol, as for `Experiment.run`.
         protocol: file, or name of one in experiments/suite.
         objects: folder of the meshes that a protocol with `[objects]` lists.
-        quick: run two objects, two trials and 15 touches only, to try out a planner; the result is not comparable.
+        quick: run a part only, as `palpate benchmark --quick`, to try out a planner; the result is not comparable.
         out: folder of the runs, one per object, whose existing trials are kept; by default they are kept in memory.
         fresh, threads, progress, limit_s, isolate, executor, trials_per_job: as for `Experiment.run`.
 

@@ -39,7 +39,7 @@ pub(super) struct Args {
     /// Also run this planner, built in or Python (MODULE:CLASS); may be repeated.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
-    /// Run a part only, to try out a planner: two objects, or all of --objects with one trial (four
+    /// Run a part only, to try out a planner: two objects, or all of --objects with one trial (two
     /// of a library), and few touches; the result is not comparable.
     #[arg(long)]
     quick: bool,

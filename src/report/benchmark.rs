@@ -82,6 +82,7 @@ fn measures(
     let measures: Vec<&Measure> =
         result.measures.iter().filter_map(|name| measure::by_id(name)).collect();
     let (first, others) = measures.split_first()?;
+    of(result.planners.first()?)?;
     let last = result.budgets.len().checked_sub(1)?;
     let is_library = result.reference.is_empty();
     let column = |measure: &Measure, name: String, title: String| {
@@ -143,13 +144,14 @@ fn measures_note(result: &BenchmarkResult) -> String {
         false => format!(" Medians over trials: {}.", medians.join(", ")),
     };
     let last = result.budgets.last().copied().unwrap_or(0);
-    let shares = match (result.reference.is_empty(), result.budgets.first()) {
-        (false, Some(start)) => format!(
-            " Left: the last mean in % of that after {start} touches. Gap closed: share of the way of the \
-             last mean from `random` to `oracle`."
-        ),
-        _ => String::new(),
-    };
+    let has_left = result.planners.iter().any(|planner| planner.left.is_some());
+    let mut shares = String::new();
+    if let Some(start) = result.budgets.first().filter(|_| has_left) {
+        shares += &format!(" Left: the last mean in % of that after {start} touches.");
+    }
+    if result.planners.iter().any(|planner| planner.mean_gap_closed.is_some()) {
+        shares += " Gap closed: share of the way of the last mean from `random` to `oracle`.";
+    }
     let others = match others.is_empty() {
         true => String::new(),
         false => format!("; after {last}: {}", others.join(", ")),

@@ -114,7 +114,7 @@ pub struct PlannerResult {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reporting: Option<MeasureMeans>,
     /// Mean of the first measure after the last budget, divided by that after the first budget; for
-    /// whole objects.
+    /// whole objects, if less is better.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<f64>,
     /// Share of the way from `random` to the oracle, in the mean of the first measure after the
@@ -239,8 +239,8 @@ pub struct BenchmarkSpec<'a> {
 const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 
 /// Settings of the quick variants of a protocol with the user's objects, which have all objects.
-const QUICK_SHAPES: [&str; 2] = ["trials=1", "touches=20"];
-const QUICK_LIBRARY: [&str; 2] = ["trials=4", "touches=5"];
+const QUICK_SHAPES: [(&str, i64); 2] = [("trials", 1), ("touches", 20)];
+const QUICK_LIBRARY: [(&str, i64); 2] = [("trials", 2), ("touches", 5)];
 
 impl BenchmarkSpec<'_> {
     /// Loads the experiments of the protocol, one per object, with `planners` beside its own.
@@ -250,9 +250,8 @@ impl BenchmarkSpec<'_> {
     pub fn experiments(&self, planners: &[String]) -> anyhow::Result<Vec<Experiment>> {
         if let Some((protocol, folder)) = objects::protocol(self.path, self.objects)? {
             let quick = if protocol.is_library() { QUICK_LIBRARY } else { QUICK_SHAPES };
-            let sets = quick.map(String::from);
-            let sets = if self.is_quick { &sets[..] } else { &[] };
-            return protocol.experiments(folder, sets, planners);
+            let sets = if self.is_quick { protocol.at_most(&quick) } else { Vec::new() };
+            return protocol.experiments(folder, &sets, planners);
         }
         let sets = if self.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
         let mut experiments = cells(self.path, &sets, planners)?.experiments;
@@ -357,9 +356,11 @@ fn add_shares(planners: &mut [PlannerResult], first: &Measure, last: usize) {
     let ends = named(BASELINE_PLANNER).zip(named(ORACLE)).filter(|(floor, top)| floor != top);
     for planner in planners {
         let after = mean(planner, last);
-        planner.left = after.zip(mean(planner, 0)).map(|(after, before)| after / before);
+        if first.direction == Direction::Minimise {
+            planner.left = after.zip(mean(planner, 0)).map(|(after, before)| after / before);
+        }
         planner.mean_gap_closed =
-            after.zip(ends).map(|(own, (floor, top))| (floor - own) / (floor - top));
+            after.zip(ends).map(|(own, (floor, top))| (own - floor) / (top - floor));
     }
 }
 

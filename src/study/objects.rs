@@ -139,6 +139,13 @@ impl ObjectProtocol {
         }
     }
 
+    /// Returns the assignments of counts that are smaller than the protocol's.
+    pub fn at_most(&self, counts: &[(&str, i64)]) -> Vec<String> {
+        let own = |key: &str| self.experiment.get(key).and_then(Value::as_integer);
+        let is_less = |(key, count): &&(&str, i64)| own(key).is_none_or(|own| *count < own);
+        counts.iter().filter(is_less).map(|(key, count)| format!("{key}={count}")).collect()
+    }
+
     /// Reported measures, the most important first.
     pub fn measures(&self) -> Vec<&'static Measure> {
         self.objects.measures.iter().filter_map(|name| measure::by_id(name)).collect()

@@ -6,6 +6,7 @@ use crate::common::shapes::box_mesh;
 use nalgebra::Point3;
 use palpate::experiment::Simulation;
 use palpate::experiment::store::Run;
+use palpate::sim::Scene;
 use palpate::study::benchmark::REFERENCE;
 use palpate::study::objects::ObjectProtocol;
 use palpate_input::format::hex;
@@ -40,6 +41,30 @@ fn the_protocol_on_ycb_runs_on_any_mesh() {
     assert!(simulation.experiment().planners.iter().all(|it| simulation.planner(it).is_some()));
     let unknown = protocol.meshes(folder.path()).unwrap_err().to_string();
     assert!(unknown.contains("78 of 78 objects"), "{unknown}");
+}
+
+/// Every shipped protocol on objects is valid, and its scenes take any library.
+#[test]
+fn shipped_protocols_on_objects_are_valid() {
+    let (mut count, suite) = (0, Path::new("experiments/suite"));
+    for entry in fs::read_dir(suite).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let Some(protocol) = ObjectProtocol::read(&path).unwrap() else { continue };
+        let missing = protocol.meshes(suite).unwrap_err().to_string();
+        assert!(missing.contains("elpis-lab/YCB_Dataset"), "{missing}");
+        assert!(protocol.measures().len() > 1, "{}", path.display());
+        count += 1;
+    }
+    assert_eq!(count, 5);
+    let library = "library={folder=\"models/lookalikes\"}".to_owned();
+    for scene in ["upright", "any-rotation"] {
+        let path = suite.join("ycb").join(scene).with_extension("toml");
+        let scene = Scene::load(&path, std::slice::from_ref(&library)).unwrap();
+        assert!(scene.whole_object.is_some() && scene.pose.is_some());
+    }
 }
 
 /// Returns a folder with the cubes `NAME/textured.obj` in `meshes`, each beside a smaller piece.
@@ -142,6 +167,11 @@ fn a_protocol_runs_on_the_meshes_of_a_folder() {
     }
     assert!(!markdown.contains("zones"), "{markdown}");
     assert!(says.contains("The same over the 1 objects"), "{says}");
+    // Fewer trials, and no more touches than the protocol has.
+    succeeds(at, &[&BENCHMARK[..], &["--quick"]].concat());
+    let quick = read(&folder, "runs/cubes-quick/benchmark.json");
+    let quick: Value = serde_json::from_str(&quick).unwrap();
+    assert_eq!((&quick["trials"], &quick["touches"]), (&json!(1), &json!(6)));
 }
 
 /// Shards write no results before all trials are there, and then the bytes of one run.
