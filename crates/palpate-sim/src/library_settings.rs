@@ -14,14 +14,14 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LibrarySettings {
-    /// Folder with mesh files, relative to the scene file. Their z axis points up. If it has none,
-    /// each of its folders is an object: its mesh with the shortest name.
+    /// Folder with mesh files, relative to the scene file. Their z axis points up. Without any, each
+    /// folder in it is an object: its mesh with the shortest name.
     pub folder: InputPath,
     /// Unit of the mesh files.
     #[serde(default)]
     pub unit: Unit,
-    /// Names of the objects: those of files, without their endings, or of folders; default: all. A
-    /// path such as `mug/textured` names a mesh in a folder; an end that all share is left out.
+    /// Names of the objects: files without their endings, folders, or paths such as `mug/textured`
+    /// without an end that all share; default: all.
     #[serde(default, skip_serializing_if = "is_default")]
     pub objects: Vec<String>,
     /// Names of objects that trials touch too, and that no hypothesis has: none of these.
