@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LibrarySettings {
-    /// Folder with mesh files, relative to the scene file. Their z axis points up. Without any, each
-    /// folder in it is an object: its mesh with the shortest name.
+    /// Folder with mesh files, relative to the scene file. Their z axis points up. Without any,
+    /// each folder in it is an object: its mesh with the shortest name.
     pub folder: InputPath,
     /// Unit of the mesh files.
     #[serde(default)]

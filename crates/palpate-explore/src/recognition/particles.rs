@@ -28,6 +28,10 @@ const TAU_M: [f64; 2] = [1.0, 1e-5];
 // heuristic: near the optimal acceptance of 0.57 in six dimensions.
 const STEP: f64 = 1.0;
 
+/// Number of shorter moves, each half as long as the one before, while most particles are copies.
+// heuristic: a rough posterior accepts few full steps.
+const SHORTER: i32 = 4;
+
 /// A pose with its residuals.
 #[derive(Clone)]
 pub(super) struct Particle {
@@ -72,9 +76,11 @@ impl Particles {
         let mut made = Self { particles: draws, log_weights, wanted, log_evidence };
         if log_evidence.is_finite() {
             made.resample(random);
+            let cold = (model.evidence.len(), 0.0);
             for _ in 0..MOVES {
-                made.advance(model, model.evidence.len(), 0.0, random);
+                made.advance(model, cold, STEP, random);
             }
+            made.separate(model, cold, random);
         }
         made
     }
@@ -114,7 +120,7 @@ impl Particles {
             if self.effective_share() < ESS * 1.5 || tau_m > 0.0 {
                 self.resample(random);
                 for _ in 0..MOVES {
-                    self.advance(model, known, tau_m, random);
+                    self.advance(model, (known, tau_m), STEP, random);
                 }
             }
         }
@@ -179,6 +185,18 @@ impl Particles {
         self.log_evidence += sum;
     }
 
+    /// Moves the particles by ever shorter steps while most are copies of others.
+    fn separate(&mut self, model: &Model, known: (usize, f64), random: &mut impl Rng) {
+        for halvings in 1..=SHORTER {
+            // Copies are drawn one after the other.
+            let moved = self.particles.array_windows().filter(|[a, b]| a.x_wo != b.x_wo).count();
+            if 2 * moved >= self.particles.len() {
+                return;
+            }
+            self.advance(model, known, STEP * 0.5f64.powi(halvings), random);
+        }
+    }
+
     /// Draws particles by their weights, systematically.
     fn resample(&mut self, random: &mut impl Rng) {
         let count = self.wanted;
@@ -187,13 +205,20 @@ impl Particles {
         self.log_weights = vec![-(count as f64).ln(); count];
     }
 
-    /// Moves every particle by one step with the posterior at the temperature as its invariant.
-    fn advance(&mut self, model: &Model, known: usize, tau_m: f64, random: &mut impl Rng) {
+    /// Moves every particle by one step of this length with the posterior of the evidence from
+    /// number `known` on at the temperature `tau_m` as its invariant.
+    fn advance(
+        &mut self,
+        model: &Model,
+        (known, tau_m): (usize, f64),
+        length: f64,
+        random: &mut impl Rng,
+    ) {
         for particle in &mut self.particles {
             let normals = free_normals(model, random);
             let accepts: f64 = random.random();
             let here = model.quadratic(&particle.fits, known, tau_m);
-            let step = drift(&here) + here.deviation(&normals) * STEP;
+            let step = drift(&here, length) + here.deviation(&normals) * length;
             let x_wo = moved(&particle.x_wo, &step);
             if !model.prior.contains(model.object, &x_wo) {
                 continue;
@@ -201,7 +226,7 @@ impl Particles {
             let fits = model.fits(&x_wo);
             let there = model.quadratic(&fits, known, tau_m);
             let log_density = |from: &Quadratic, step: Vector6<f64>| {
-                from.log_density(&(step - drift(from)), STEP, 0.0)
+                from.log_density(&(step - drift(from, length)), length, 0.0)
             };
             let log =
                 there.value - here.value + log_density(&there, -step) - log_density(&here, step);
@@ -212,9 +237,9 @@ impl Particles {
     }
 }
 
-/// Mean of a Langevin step.
-fn drift(here: &Quadratic) -> Vector6<f64> {
-    here.to_peak * (0.5 * STEP * STEP)
+/// Mean of a Langevin step of this length.
+fn drift(here: &Quadratic, length: f64) -> Vector6<f64> {
+    here.to_peak * (0.5 * length * length)
 }
 
 /// Returns standard normal numbers along the directions in which a pose can change.

@@ -29,6 +29,10 @@ const LEVER_M: f64 = 0.03;
 // heuristic: undecided.
 const UNKNOWN_MISS: f64 = 0.5;
 
+/// Number of a contact's standard deviations within which the hull's predicted contact is the same.
+// heuristic: nearly all errors.
+const NOISE_SDS: f64 = 3.0;
+
 /// Largest number of further points of a touch.
 const POINTS: usize = 24;
 
@@ -102,8 +106,10 @@ impl TouchMeasurement {
             .map(|point| {
                 let (distance, Nearest { q_w, face_w, .. }) =
                     Residual::of_point(object, x_wo, &point.p_w);
-                // On an edge, the hull's normal lies between those of the faces.
-                let is_same = |p_w: &Point3<f64>| (p_w - q_w).norm() < 0.5 * self.hull.radius_m;
+                // On an edge, the hull's normal lies between those of the faces; and near a thin
+                // plate, a noisy contact is nearest to a face that the hull does not meet.
+                let near_m = 0.5 * self.hull.radius_m + NOISE_SDS * point.sd_m;
+                let is_same = |p_w: &Point3<f64>| (p_w - q_w).norm() < near_m;
                 let normal_w = match &met {
                     Some(hit) if is_same(&hit.point) => hit.normal,
                     _ => face_w,
