@@ -97,9 +97,9 @@ fn measures(
     let shares = shares.into_iter().filter(|_| !is_library);
     let others_columns =
         others.iter().map(|it| column(it, it.title.to_owned(), it.title.to_owned()));
-    let failures = is_library.then(|| Column::new("failed"));
+    let ends = ["95 % sure after", "failed"].map(Column::new).into_iter().filter(|_| is_library);
     let columns = scene.into_iter().chain([Column::new("planner")]).chain(budgets);
-    let columns = columns.chain(shares).chain(others_columns).chain(failures);
+    let columns = columns.chain(shares).chain(others_columns).chain(ends);
     let mut table = Table::new(columns);
     let cells = |means: &MeasureMeans| -> [Vec<Cell>; 2] {
         let after = |index: usize| match means.get(first.id, index) {
@@ -115,6 +115,7 @@ fn measures(
                 let on_scene = &planner.objects[i];
                 let mut row = vec![scene.as_str().into(), planner.name.as_str().into()];
                 row.extend(cells(&on_scene.means).concat());
+                row.push(on_scene.sure_after.into());
                 row.push(failed(on_scene.failures, on_scene.trials));
                 table.rows.push(row);
             }
@@ -151,6 +152,9 @@ fn measures_note(result: &BenchmarkResult) -> String {
     }
     if result.planners.iter().any(|planner| planner.mean_gap_closed.is_some()) {
         shares += " Gap closed: share of the way of the last mean from `random` to `oracle`.";
+    }
+    if result.reference.is_empty() {
+        shares += " 95 % sure after: median of the touches until an object has that probability.";
     }
     let others = match others.is_empty() {
         true => String::new(),

@@ -6,6 +6,7 @@ use crate::experiment::metrics::Metrics;
 use crate::experiment::metrics::shape::ShapeMetrics;
 use crate::experiment::row::{TouchRow, TrialRow};
 use crate::report::table::{Cell, Column, Table};
+use crate::sim::finger::effects::contact_noise::ContactNoiseEffect;
 use palpate_explore::evidence::{Contact, FreeVolume, Outcome};
 use palpate_gp::fit::Fit;
 use palpate_input::config::Rules;
@@ -38,7 +39,9 @@ fn allowed() -> BTreeMap<String, String> {
     let Ok(complete) = Experiment::from_table(COMPLETE.parse().unwrap_or_default()) else {
         return BTreeMap::new();
     };
-    let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
+    let mut complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
+    // This effect excludes the others.
+    complete.scene.effects.contact_noise = Some(ContactNoiseEffect::default());
     let rules = Rules::allowed_values(&complete).into_iter();
     // The page lists the measures themselves.
     let measures = MEASURES.iter().map(|measure| measure.id).collect::<Vec<_>>().join(", ");

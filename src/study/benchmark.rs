@@ -14,7 +14,7 @@ use super::run::cells;
 use crate::experiment::Experiment;
 use crate::experiment::measure::{Direction, Measure};
 use crate::experiment::planner_names::ORACLE;
-use crate::experiment::row::{TrialRow, planner_rows};
+use crate::experiment::row::{TouchRow, TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::median;
 use crate::experiment::store::Run;
@@ -142,6 +142,10 @@ pub struct PlannerOnObject {
     /// Means of the measures.
     #[serde(flatten)]
     pub means: MeasureMeans,
+    /// Median over trials of the touches after which the most likely object first has the
+    /// probability 0.95, for a library; `None` if half of the trials have none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sure_after: Option<f64>,
 }
 
 /// Error relative to the reference with its 95 % bootstrap interval; both `None` without a trial.
@@ -384,6 +388,8 @@ fn planner(
             error: RelativeError::new(&[scores]),
             error_m: budgets.iter().map(after).collect(),
             means: MeasureMeans::new(measures, std::slice::from_ref(rows), budgets),
+            sure_after: median(&rows.iter().map(|row| sure_after(row)).collect::<Vec<_>>())
+                .filter(|touches| touches.is_finite()),
             trials: rows.len() - failures,
             failures,
         }
@@ -423,6 +429,17 @@ fn planner(
         mean_gap_closed: None,
         objects,
     }
+}
+
+/// Probability of the most likely object that counts as sure.
+const SURE: f64 = 0.95;
+
+/// Touches of a trial after which the most likely object is [`SURE`]; infinite if it never is.
+fn sure_after(row: &TrialRow) -> f64 {
+    let is_sure = |touch: &TouchRow| {
+        touch.recognition.as_ref().is_some_and(|found| found.confidence() >= SURE)
+    };
+    row.touches.iter().position(is_sure).map_or(f64::INFINITY, |place| place as f64 + 1.0)
 }
 
 /// Error of a planner after some touches, relative to the reference in the same trial.

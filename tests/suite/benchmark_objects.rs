@@ -223,6 +223,8 @@ fn a_protocol_makes_a_library_of_a_folder() {
             let ends = scene["measure_intervals"]["recognised"][1].as_array().unwrap();
             // Of three trials a share is not known well, even where all are right.
             assert!(right > 0.6 && ends[0].as_f64().unwrap() < 0.5, "{scene}");
+            let sure = &scene["sure_after"];
+            assert!(sure.is_null() || (1.0..=3.0).contains(&sure.as_f64().unwrap()), "{scene}");
         }
     }
     let run = Run::read(&folder.path().join("runs/cubes/cubes-scene-exact")).unwrap();
