@@ -363,8 +363,9 @@ fn add_shares(planners: &mut [PlannerResult], first: &Measure, last: usize) {
         if first.direction == Direction::Minimise {
             planner.left = after.zip(mean(planner, 0)).map(|(after, before)| after / before);
         }
+        // The share of no way is −0.
         planner.mean_gap_closed =
-            after.zip(ends).map(|(own, (floor, top))| (own - floor) / (top - floor));
+            after.zip(ends).map(|(own, (floor, top))| (own - floor) / (top - floor) + 0.0);
     }
 }
 
