@@ -11,6 +11,7 @@ use palpate::experiment::store::Run;
 use palpate::experiment::store::resolved;
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::Planner;
+use palpate::explore::planner::candidates::{Candidate, Candidates, free_aim};
 use palpate::explore::planner::{self, Offer};
 use palpate::explore::whole_object::{ImplicitSurface, Surface};
 use palpate::geometry::bvh::MeshBvh;
@@ -21,7 +22,7 @@ use palpate::sim::environment::ObjectShape;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Target};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 use crate::common::around::{approach, belief, meet, mesh, simulation, trial};
 
@@ -44,6 +45,22 @@ fn plate(p: Vector3<f64>) -> f64 {
 fn touching(p: Vector3<f64>) -> f64 {
     let one = |x: f64| (p - Vector3::x() * x).norm() - 0.03;
     one(-0.0295).min(one(0.0295))
+}
+
+/// A rod 120 mm long and 8 mm thick, with a knob at one end.
+fn rod(p: Vector3<f64>) -> f64 {
+    let along = (p.x + p.z) / SQRT_2;
+    let beside = Vector3::new((p.x - p.z) / SQRT_2, p.y, (along.abs() - 0.056).max(0.0));
+    let knob = Vector3::new(0.04, 0.0, 0.04) - p;
+    (beside.norm() - 0.004).min(knob.norm() - 0.013)
+}
+
+/// A cup 80 mm wide and high with a wall of 4 mm, open along z.
+fn cup(p: Vector3<f64>) -> f64 {
+    let wide = p.x.hypot(p.y);
+    let outer = (wide - 0.04).max(p.z.abs() - 0.04);
+    let inner = (wide - 0.036).max(-0.036 - p.z);
+    outer.max(-inner)
 }
 
 fn last_share(row: &TrialRow) -> f64 {
@@ -113,6 +130,47 @@ fn a_thin_plate_keeps_both_sides() {
         let thick_m = front.point.y - back.point.y;
         assert!((0.001..0.012).contains(&thick_m), "{thick_m} at ({x}, {z})");
     }
+}
+
+/// A flat object has a shorter length scale across it than along it.
+#[test]
+fn a_plate_is_fitted_with_a_length_for_each_axis() {
+    let simulation = simulation(plate, "planners = [\"active\"]\ntouches = 45");
+    let row = trial(&simulation, "active");
+    let lengths_m =
+        &row.touches.last().unwrap().fit.as_ref().unwrap().hyperparameters.length_scales;
+    let [x_m, y_m, z_m] = lengths_m[..] else { panic!("{lengths_m:?}") };
+    assert!(y_m < 0.8 * x_m.min(z_m), "{lengths_m:?}");
+}
+
+/// `active` goes where the object may extend to, not only along what it has found.
+#[test]
+fn a_thin_rod_is_followed_to_its_ends() {
+    let simulation = simulation(rod, "planners = [\"active\"]\ntouches = 45");
+    let row = trial(&simulation, "active");
+    let along =
+        row.touches.iter().filter_map(TouchRow::contact).map(|p_w| (p_w.x + p_w.z) / SQRT_2);
+    let [least, most] =
+        along.fold([f64::INFINITY, -f64::INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+    assert!(least < -0.055 && most > 0.055, "contacts from {least} to {most} m");
+    assert!(last_share(&row) < 0.015, "{}", last_share(&row));
+}
+
+/// A wall that another one faces is approached from above.
+#[test]
+fn the_inside_of_a_cup_has_free_approaches() {
+    let simulation = simulation(cup, "planners = [\"active\"]\ntouches = 20");
+    let row = trial(&simulation, "active");
+    let belief = row.belief(simulation.experiment(), 20).unwrap().unwrap();
+    let surface = belief.implicit_surface().unwrap();
+    let candidates = Candidates::new(surface, &mut stream(1, 0, "candidates")).unwrap();
+    let is_inner = |it: &&Candidate| {
+        let inward = -it.p_w.x * it.normal_w.x - it.p_w.y * it.normal_w.y;
+        it.chance == 1.0 && it.p_w.z.abs() < 0.03 && inward > 0.8 * it.p_w.x.hypot(it.p_w.y)
+    };
+    let inner: Vec<&Candidate> = candidates.all.iter().filter(is_inner).collect();
+    let free = inner.iter().filter(|it| free_aim(surface, it).is_some()).count();
+    assert!(inner.len() > 20 && free > inner.len() * 3 / 4, "{free} of {}", inner.len());
 }
 
 /// Two touching balls are found, with the unreachable waist between them.

@@ -1,29 +1,39 @@
-//! Candidate targets on the estimated surface of a whole object: whether a straight approach to
-//! them is free, and where the space is still unexplored.
+//! Candidate targets on the estimated surface of a whole object, and where a surface may be beside
+//! it: whether a straight approach to them is free, and where the space is still unexplored.
 
 use super::plan::{Fallback, Plan};
 use super::sample::{in_ball, random_target};
 use crate::task::{Aim, Target, any_orthogonal};
 use crate::whole_object::ImplicitSurface;
 use nalgebra::{Point3, UnitVector3};
+use palpate_gp::math::normal::cumulative;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 
 /// Cells per side of the surface's box for the candidate mesh, and the largest number of
 /// candidates; heuristics.
 const CELLS: u32 = 28;
 const MOST: usize = 400;
 
-/// A point on the estimated surface.
+/// Levels of the field, in fingertip radii, on which candidates lie where the object may extend
+/// beyond its estimated surface, and their largest number for each.
+// heuristic: a gap in a thin part, and the end of a part that goes on.
+const BEYOND: [f64; 2] = [0.5, 1.5];
+const MOST_BEYOND: usize = 100;
+
+/// A point where the surface may be.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// Position in `W`.
     pub p_w: Point3<f64>,
     /// Unit outward normal at the point.
     pub normal_w: UnitVector3<f64>,
+    /// Twice the probability that the point is inside the object: 1 on the estimated surface.
+    pub chance: f64,
 }
 
-/// Candidate targets spread over the estimated surface.
+/// Candidate targets spread over the estimated surface, and over places where it may extend to.
 pub struct Candidates<'a> {
     belief: &'a ImplicitSurface,
     /// The candidates, in no particular order.
@@ -31,16 +41,27 @@ pub struct Candidates<'a> {
 }
 
 impl<'a> Candidates<'a> {
-    /// Computes the candidates on the surface of `belief`, thinned evenly. Returns `None` before
-    /// the first fit, or if the belief has no surface.
+    /// Computes the candidates of `belief`, thinned evenly. Returns `None` before the first fit, or
+    /// if the belief has no surface.
     pub fn new(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
         let surface = belief.surface()?;
-        let points_w = surface.points(CELLS, MOST, |step| rng.random_range(0..step))?;
+        let mut first = |step| rng.random_range(0..step);
+        let mut points_w = surface.points(CELLS, MOST, &mut first)?;
+        let count = points_w.len();
+        for radii in BEYOND {
+            let level_m = radii * belief.scope().radius_m;
+            points_w.extend(surface.level_points(level_m, CELLS, MOST_BEYOND, &mut first));
+        }
         let fields = surface.fields(&points_w);
-        let all = points_w.into_iter().zip(fields).filter_map(|(p_w, field)| {
-            let normal_w = UnitVector3::try_new(field.gradient, 1e-9)?;
-            Some(Candidate { p_w, normal_w })
-        });
+        let sds_m = surface.sds_m(&points_w[count..]);
+        let beyond = fields[count..].iter().zip(sds_m);
+        let beyond = beyond.map(|(field, sd_m)| 2.0 * cumulative(-field.value / sd_m));
+        let chances: Vec<f64> = std::iter::repeat_n(1.0, count).chain(beyond).collect();
+        let all =
+            points_w.into_iter().zip(fields).zip(chances).filter_map(|((p_w, field), chance)| {
+                let normal_w = UnitVector3::try_new(field.gradient, 1e-9)?;
+                Some(Candidate { p_w, normal_w, chance })
+            });
         Some(Self { belief, all: all.collect() })
     }
 
@@ -66,10 +87,11 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Plans a touch at the candidate with the highest score whose approach is free; `anywhere` if
-    /// none is. `scores` has one value per candidate, in their order.
+    /// Plans a touch at the candidate with the highest score times chance whose approach is free;
+    /// `anywhere` if none is. `scores` has one value per candidate, in their order.
     pub fn best(&self, scores: impl Iterator<Item = f64>, anywhere: Target) -> Plan {
-        let mut order: Vec<(f64, &Candidate)> = scores.zip(&self.all).collect();
+        let scored = scores.zip(&self.all).map(|(score, it)| (score * it.chance, it));
+        let mut order: Vec<(f64, &Candidate)> = scored.collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
         let free = order.into_iter().find_map(|(_, candidate)| {
             let aim = free_aim(self.belief, candidate)?;
@@ -80,8 +102,9 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// Sideways tilt of an approach from the normal, as a tangent (35°); a heuristic.
-const TILT: f64 = 0.7;
+/// Sideways tilts of an approach from the normal, as tangents (35° and 65°), and the number of
+/// directions with each; heuristics.
+const TILTS: [(f64, u32); 2] = [(0.7, 4), (2.1, 8)];
 
 /// Smallest cosine between approach and normal; a heuristic.
 const SLANT: f64 = 0.3;
@@ -94,20 +117,20 @@ const ALONG: f64 = 0.97;
 /// Returns an aim at a candidate whose approach is clear
 /// of the estimated surface: against the normal if possible, tilted otherwise. Returns `None` if
 /// there is none that differs from all earlier targets.
-pub fn free_aim(belief: &ImplicitSurface, Candidate { p_w, normal_w }: &Candidate) -> Option<Aim> {
+pub fn free_aim(belief: &ImplicitSurface, candidate: &Candidate) -> Option<Aim> {
+    let Candidate { p_w, normal_w, .. } = candidate;
     let ball = &belief.scope().ball;
     let outward_w = (p_w - ball.centre_w).try_normalize(1e-12).unwrap_or(**normal_w);
     let beside_w = any_orthogonal(normal_w);
     let across_w = normal_w.cross(&beside_w);
-    let ways = [
-        **normal_w,
-        **normal_w + outward_w,
-        **normal_w + beside_w * TILT,
-        **normal_w - beside_w * TILT,
-        **normal_w + across_w * TILT,
-        **normal_w - across_w * TILT,
-    ];
-    let upright = ways.iter().filter_map(|way_w| UnitVector3::try_new(*way_w, 1e-6));
+    let tilted = TILTS.iter().flat_map(|&(tilt, count)| {
+        (0..count).map(move |i| {
+            let (sin, cos) = (TAU * f64::from(i) / f64::from(count)).sin_cos();
+            **normal_w + (beside_w * cos + across_w * sin) * tilt
+        })
+    });
+    let ways = [**normal_w, **normal_w + outward_w].into_iter().chain(tilted);
+    let upright = ways.filter_map(|way_w| UnitVector3::try_new(way_w, 1e-6));
     upright
         .filter(|way_w| way_w.dot(normal_w) >= SLANT)
         .map(|way_w| Aim { p_w: *p_w, direction_w: -way_w })

@@ -236,6 +236,17 @@ pub struct PriorMean {
 /// a body; a heuristic.
 const THINNEST: f64 = 0.1;
 
+/// Returns centre and half axes of the body that `points`, in the `ball` around them, span; `None`
+/// unless two differ.
+pub(super) fn half_axes_m<'a>(
+    ball: &Ball,
+    points: impl Iterator<Item = &'a Point3<f64>>,
+) -> Option<(Point3<f64>, Vector3<f64>)> {
+    let [low, high] = extent(points).filter(|[low, high]| low != high)?;
+    let radii_m = (high - low).map(|side_m| (side_m / 2.0).max(THINNEST * ball.radius_m));
+    Some((nalgebra::center(&low, &high), radii_m))
+}
+
 /// Radius of the sphere before two contacts exist, as a fraction of the ball's radius; a heuristic.
 const UNKNOWN: f64 = 0.5;
 
@@ -246,14 +257,8 @@ impl PriorMean {
         ball: &Ball,
         points: impl Iterator<Item = &'a Point3<f64>>,
     ) -> Self {
-        let thinnest_m = THINNEST * ball.radius_m;
-        let (centre_w, radii_m) = match extent(points) {
-            Some([low, high]) if low != high => {
-                let radii_m = (high - low) / 2.0;
-                (nalgebra::center(&low, &high), radii_m.map(|radius_m| radius_m.max(thinnest_m)))
-            }
-            _ => (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m)),
-        };
+        let unknown = || (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m));
+        let (centre_w, radii_m) = half_axes_m(ball, points).unwrap_or_else(unknown);
         let body = match shape {
             PriorShape::Ellipsoid => Some((centre_w, radii_m)),
             PriorShape::Sphere => Some((centre_w, Vector3::repeat(radii_m.product().cbrt()))),

@@ -193,11 +193,31 @@ impl Surface {
     ) -> Option<Vec<Point3<f64>>> {
         let (vertices, triangles, cell_m) = self.crude(cells);
         let (crude, _) = Mesh::new(&vertices, &triangles).ok()?;
-        let step = crude.vertices().len().div_ceil(most).max(1);
-        let chosen = crude.vertices().iter().skip(first(step)).step_by(step);
-        let mut points_w: Vec<Point3<f64>> = chosen.copied().collect();
+        let mut points_w = thinned(crude.vertices(), most, first);
         self.approach(&mut points_w, cell_m);
         Some(points_w)
+    }
+
+    /// Returns about `most` points spread over the level set of the field at `level_m`, wherever it
+    /// is: every n-th vertex on its grid from vertex `first(n)` on.
+    pub fn level_points(
+        &self,
+        level_m: f64,
+        cells: u32,
+        most: usize,
+        first: impl FnOnce(usize) -> usize,
+    ) -> Vec<Point3<f64>> {
+        let [low, high] = &self.bounds;
+        let (vertices, _) = zero_set([*low, *high], self.cell_m(cells), |points_w| {
+            self.values(points_w).into_iter().map(|value| value - level_m).collect()
+        });
+        thinned(&vertices, most, first)
+    }
+
+    /// Side of a cell with `cells` along the longest side of the box.
+    fn cell_m(&self, cells: u32) -> f64 {
+        let [low, high] = &self.bounds;
+        (high - low).max() / f64::from(cells.max(1))
     }
 
     /// Returns the surface as closed triangles, from a grid of `cells` along the longest side of
@@ -227,8 +247,7 @@ impl Surface {
     /// Returns vertices where the field's interpolated values are zero, the triangles between them
     /// that were touched, and the side of a cell.
     fn crude(&self, cells: u32) -> (Vec<Point3<f64>>, Vec<[u32; 3]>, f64) {
-        let [low, high] = &self.bounds;
-        let cell_m = (high - low).max() / f64::from(cells.max(1));
+        let ([low, high], cell_m) = (&self.bounds, self.cell_m(cells));
         let (vertices, triangles) = zero_set([*low, *high], cell_m, |points| self.values(points));
         let triangles = touched_components(&vertices, triangles, &self.contacts);
         (vertices, triangles, cell_m)
@@ -249,6 +268,16 @@ impl Surface {
             moving = moved.collect();
         }
     }
+}
+
+/// Returns about `most` of `points`, every n-th from `first(n)` on.
+fn thinned(
+    points: &[Point3<f64>],
+    most: usize,
+    first: impl FnOnce(usize) -> usize,
+) -> Vec<Point3<f64>> {
+    let step = points.len().div_ceil(most).max(1);
+    points.iter().skip(first(step)).step_by(step).copied().collect()
 }
 
 /// Returns points as places of a Gaussian process.
