@@ -77,7 +77,7 @@ impl<'a> Candidates<'a> {
         rng: &mut ChaCha8Rng,
         score: impl FnOnce(&[Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
-        if let Some(aim) = explore_unknown(belief, rng) {
+        if let Some(aim) = spread(belief, rng).or_else(|| explore_unknown(belief, rng)) {
             return Plan::at(aim);
         }
         let aside = random_target(belief, rng);
@@ -87,10 +87,11 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Plans a touch at the candidate with the highest score times chance whose approach is free;
-    /// `anywhere` if none is. `scores` has one value per candidate, in their order.
+    /// Plans a touch at the candidate with the highest score times squared chance, since a score is
+    /// a variance, whose approach is free; `anywhere` if none is. `scores` has one value per
+    /// candidate, in their order.
     pub fn best(&self, scores: impl Iterator<Item = f64>, anywhere: Target) -> Plan {
-        let scored = scores.zip(&self.all).map(|(score, it)| (score * it.chance, it));
+        let scored = scores.zip(&self.all).map(|(score, it)| (score * it.chance * it.chance, it));
         let mut order: Vec<(f64, &Candidate)> = scored.collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
         let free = order.into_iter().find_map(|(_, candidate)| {
@@ -147,6 +148,29 @@ fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     belief.aims().iter().all(|asked| {
         (asked.p_w - aim.p_w).norm() > near_m || asked.direction_w.dot(&aim.direction_w) < ALONG
     })
+}
+
+/// Number of contacts up to which touches spread around the ball, and directions tried for each.
+// heuristic: six span a body along three axes.
+const SPREAD: usize = 6;
+const DIRECTIONS: usize = 200;
+
+/// Returns an aim at the ball's centre, from the direction farthest from those of earlier aims;
+/// `None` with enough contacts, or if no direction is reachable.
+pub fn spread(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
+    if belief.contacts().count() >= SPREAD {
+        return None;
+    }
+    let scope = belief.scope();
+    let ball = &scope.ball;
+    let nearest = |aim: &Aim| {
+        let cosines = belief.aims().iter().map(|asked| asked.direction_w.dot(&aim.direction_w));
+        cosines.fold(-1.0, f64::max)
+    };
+    (0..DIRECTIONS)
+        .map(|_| Aim::against(ball.centre_w, &(in_ball(ball, rng) - ball.centre_w)))
+        .filter(|aim| scope.reaches(aim))
+        .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
 }
 
 /// Fraction of the whole ball below which the ball around the contacts counts as unexplored, and

@@ -8,7 +8,7 @@ use super::surface::Surface;
 use crate::evidence::{End, Evidence, Outcome};
 use crate::task::{Aim, Ball, Target};
 use crate::view::{LookOffer, RigidError, SeenSurface};
-use nalgebra::{Point3, UnitVector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::kernel;
@@ -55,10 +55,9 @@ const CUBES: f64 = 2e8;
 const TRIED_MIN: f64 = 3.0;
 const TRIED_MAX: f64 = 60.0;
 
-/// Exponent of the object's extent along an axis in the length scale along it: a flat object bends
-/// within its thickness, and a long one slowly along its length.
-// heuristic: the most likely one is 0.01 to 0.55 on eleven objects of the YCB set.
-const FLATTENED: f64 = 1.0 / 3.0;
+/// Bounds of the exponent of the object's extent along an axis in the length scale along it: with a
+/// larger one, a flat object bends within its thickness and a long one slowly along its length.
+const EXPONENT: [f64; 2] = [0.0, 1.0];
 
 /// Number of rows of the covariance above which hyperparameters are kept until the observations
 /// have grown by this factor since the last search.
@@ -300,11 +299,12 @@ impl ImplicitSurface {
         (prior, observations)
     }
 
-    /// Returns the length scale along each axis as a share of their geometric mean.
-    fn flatness(&self, ball: &Ball) -> [f64; 3] {
-        let Some((_, radii_m)) = half_axes_m(ball, self.points().iter()) else { return [1.0; 3] };
-        let mean_m = geometric_mean(radii_m.as_slice());
-        radii_m.map(|radius_m| (radius_m / mean_m).powf(FLATTENED)).into()
+    /// Returns the logarithm of the object's extent along each axis, relative to their geometric
+    /// mean.
+    fn log_extents(&self, ball: &Ball) -> [f64; 3] {
+        let Some((_, radii_m)) = half_axes_m(ball, self.points().iter()) else { return [0.0; 3] };
+        let logs = radii_m.map(f64::ln);
+        logs.map(|log| log - logs.mean()).into()
     }
 
     /// Whether normals are observed; false for a kernel without gradients.
@@ -319,8 +319,9 @@ impl ImplicitSurface {
     ) -> Result<Fit, CovarianceError> {
         let ball = self.estimated_ball();
         let radius_m = ball.radius_m;
-        let shares = self.flatness(&ball);
-        let lengths_m = |length_m: f64| shares.map(|share| share * length_m);
+        let extents = self.log_extents(&ball);
+        let lengths_m =
+            |exponent: f64, length_m: f64| extents.map(|log| length_m * (exponent * log).exp());
         let SpatialGpSettings { length_scale, noise, slope_noise, .. } = &self.settings;
         let mut ranges = vec![length_scale.map(|share| share * radius_m), *noise];
         ranges.extend(self.normals().then_some(*slope_noise));
@@ -328,17 +329,25 @@ impl ImplicitSurface {
         let signals_m = SIGNAL_RANGE.map(|share| share * radius_m);
         let is_known = self.evidence.has_known_errors();
         ranges.extend(is_known.then_some(signals_m));
-        let ranges: Vec<[f64; 2]> = ranges.iter().map(|range| range.map(f64::ln)).collect();
+        let logs = ranges.iter().map(|range| range.map(f64::ln));
+        let ranges: Vec<[f64; 2]> = std::iter::once(EXPONENT).chain(logs).collect();
         let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
         let mut begin: Vec<f64> = match start {
             Some(start) => {
-                let (length_m, ratio) = (geometric_mean(&start.length_scales), start.noise_ratio());
-                let mut begin = vec![length_m.ln(), ratio.height.ln()];
+                let logs =
+                    Vector3::from_fn(|i, _| start.length_scales.get(i).map_or(0.0, |it| it.ln()));
+                let (length_m, ratio) = (logs.mean().exp(), start.noise_ratio());
+                let extents = Vector3::from(extents);
+                // Least squares.
+                let exponent = logs.dot(&extents) / extents.norm_squared().max(f64::MIN_POSITIVE);
+                let mut begin = vec![exponent, length_m.ln(), ratio.height.ln()];
                 begin.extend(self.normals().then(|| (ratio.slope * length_m).ln()));
                 begin.extend(is_known.then(|| start.signal_sd.ln()));
                 begin
             }
-            None => ranges.iter().copied().map(middle).collect(),
+            None => {
+                std::iter::once(0.0).chain(ranges.iter().skip(1).copied().map(middle)).collect()
+            }
         };
         // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
@@ -354,19 +363,16 @@ impl ImplicitSurface {
         let steps = [if start.is_some() { STEP_NEXT } else { STEP_FIRST }, STEP_LAST];
         let budget = (CUBES / cube).clamp(TRIED_MIN, TRIED_MAX) as u32;
         let (found, signal_sd) = compass(begin, &ranges, axis, steps, budget, |logs| {
-            let (length_m, ratio) = parameters(logs);
-            let found = likelihood.profile(&lengths_m(length_m), ratio, &signal_sd, None)?;
+            let (exponent, length_m, ratio) = parameters(logs);
+            let lengths_m = lengths_m(exponent, length_m);
+            let found = likelihood.profile(&lengths_m, ratio, &signal_sd, None)?;
             Ok::<_, CovarianceError>((found.log_likelihood, found.signal_sd))
         })?;
-        let (length_m, ratio) = parameters(&found.x);
+        let (exponent, length_m, ratio) = parameters(&found.x);
+        let lengths_m = lengths_m(exponent, length_m).to_vec();
         Ok(Fit {
             kernel: None,
-            hyperparameters: Hyperparameters::new(
-                signal_sd,
-                lengths_m(length_m).to_vec(),
-                ratio,
-                0.0,
-            ),
+            hyperparameters: Hyperparameters::new(signal_sd, lengths_m, ratio, 0.0),
             log_likelihood: found.value,
             nystrom_residual_sd: None,
             factorisations: found.evaluations,
@@ -433,19 +439,16 @@ fn is_kept(last: &Fit, observations: &Observations) -> bool {
     observations.order() > KEPT_ROWS && is_recent
 }
 
-/// Returns the geometric mean of positive numbers.
-fn geometric_mean(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
-}
-
-/// Returns the geometric mean of the length scales, m, and noise ratios from their logarithms; the
-/// slopes' noise is per length scale. With errors of known size, the last is that of the signal.
-fn parameters(logs: &[f64], is_known: bool) -> (f64, NoiseRatio) {
+/// Returns the exponent of the extents, the geometric mean of the length scales, m, and the noise
+/// ratios, from the exponent and the logarithms of the others; the slopes' noise is per length
+/// scale. With errors of known size, the last is that of the signal.
+fn parameters(logs: &[f64], is_known: bool) -> (f64, f64, NoiseRatio) {
     let (signal, logs) = match logs.split_last() {
         Some((signal, logs)) if is_known => (Some(signal), logs),
         _ => (None, logs),
     };
     let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());
     let known = signal.map_or(0.0, |log| (-log).exp());
-    (at(0), NoiseRatio { height: at(1), slope: at(2) / at(0), known })
+    let exponent = logs.first().copied().unwrap_or(0.0);
+    (exponent, at(1), NoiseRatio { height: at(2), slope: at(3) / at(1), known })
 }
