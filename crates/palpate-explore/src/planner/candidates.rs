@@ -150,15 +150,15 @@ fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     })
 }
 
-/// Number of contacts up to which touches spread around the ball, and directions tried for each.
+/// Number of first touches that spread around the ball, and directions tried for each.
 // heuristic: six span a body along three axes.
 const SPREAD: usize = 6;
 const DIRECTIONS: usize = 200;
 
 /// Returns an aim at the ball's centre, from the direction farthest from those of earlier aims;
-/// `None` with enough contacts, or if no direction is reachable.
-pub fn spread(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
-    if belief.contacts().count() >= SPREAD {
+/// `None` after the first touches, or if no direction is reachable.
+fn spread(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
+    if belief.aims().len() >= SPREAD {
         return None;
     }
     let scope = belief.scope();

@@ -12,8 +12,8 @@ pub struct SpatialGpSettings {
     pub kernel: String,
     /// Prior mean of the field.
     pub prior: PriorShape,
-    /// Bounds of the length scales' geometric mean, as fractions of the radius of the ball around the
-    /// contacts.
+    /// Bounds of the length scales' geometric mean, as fractions of the radius of the ball around
+    /// the contacts.
     pub length_scale: [f64; 2],
     /// Bounds of the contacts' noise, as fractions of the field's standard deviation.
     pub noise: [f64; 2],
