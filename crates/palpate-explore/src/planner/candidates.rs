@@ -150,15 +150,17 @@ fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     })
 }
 
-/// Number of first touches that spread around the ball, and directions tried for each.
-// heuristic: six span a body along three axes.
+/// Number of contacts up to which touches spread around the ball, at most twice as many, and
+/// directions tried for each.
+// heuristic: six span a body along three axes; through the middle of a ring all miss.
 const SPREAD: usize = 6;
 const DIRECTIONS: usize = 200;
 
 /// Returns an aim at the ball's centre, from the direction farthest from those of earlier aims;
 /// `None` after the first touches, or if no direction is reachable.
 fn spread(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
-    if belief.aims().len() >= SPREAD {
+    let is_spread = belief.contacts().count() >= SPREAD || belief.aims().len() >= 2 * SPREAD;
+    if is_spread {
         return None;
     }
     let scope = belief.scope();
