@@ -131,8 +131,8 @@ impl Oracle {
         errors.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, target)| target)
     }
 
-    /// Returns random places of the estimated surface with a free path; random directions fill up
-    /// the list.
+    /// Returns random places of the estimated surface, and of where it may extend to, with a free
+    /// path; random directions fill up the list.
     fn aims(&mut self, surface: &ImplicitSurface) -> Vec<Target> {
         let tried = self.search.settings.oracle.candidates;
         let rng = &mut self.search.rng;

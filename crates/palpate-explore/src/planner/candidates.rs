@@ -77,7 +77,7 @@ impl<'a> Candidates<'a> {
         rng: &mut ChaCha8Rng,
         score: impl FnOnce(&[Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
-        if let Some(aim) = spread(belief, rng).or_else(|| explore_unknown(belief, rng)) {
+        if let Some(aim) = explore_unknown(belief, rng) {
             return Plan::at(aim);
         }
         let aside = random_target(belief, rng);
@@ -115,9 +115,9 @@ const SLANT: f64 = 0.3;
 const NEAR: f64 = 0.25;
 const ALONG: f64 = 0.97;
 
-/// Returns an aim at a candidate whose approach is clear
-/// of the estimated surface: against the normal if possible, tilted otherwise. Returns `None` if
-/// there is none that differs from all earlier targets.
+/// Returns an aim at a candidate whose approach is clear of the estimated surface: against the
+/// normal if possible, tilted otherwise. Returns `None` if there is none that differs from all
+/// earlier targets.
 pub fn free_aim(belief: &ImplicitSurface, candidate: &Candidate) -> Option<Aim> {
     let Candidate { p_w, normal_w, .. } = candidate;
     let ball = &belief.scope().ball;
@@ -189,9 +189,14 @@ const SIDES: usize = 5;
 /// Unexplored gaps smaller than this share of the ball's radius are ignored; a heuristic.
 const HOLE: f64 = 0.15;
 
-/// Returns an aim into the largest reachable gap between contacts and swept space; `None` if such a
+/// Returns an aim into space that earlier touches leave open: at first from all around, then every
+/// few touches into the largest reachable gap between contacts and swept space; `None` if such a
 /// touch is not due or no gap is large enough.
 pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
+    spread(belief, rng).or_else(|| fill_gap(belief, rng))
+}
+
+fn fill_gap(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;
     let is_known = scope.estimated_ball(belief.points().iter()).radius_m >= KNOWN * whole.radius_m;

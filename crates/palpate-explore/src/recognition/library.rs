@@ -27,6 +27,8 @@ pub struct LibraryObject {
     pub stand_m: f64,
     /// Points evenly spread over the surface, in `O`.
     pub samples: Vec<Point3<f64>>,
+    /// Unit normals of the faces of `samples`.
+    pub normals: Vec<Vector3<f64>>,
 }
 
 impl LibraryObject {
@@ -35,9 +37,12 @@ impl LibraryObject {
         let (low, high) = mesh.bounds();
         let middle_m = nalgebra::center(&low, &high);
         let bvh = MeshBvh::new(mesh.transformed(&Isometry3::from(-middle_m.coords)));
-        let samples = over_surface(bvh.mesh(), SAMPLES).into_iter().map(|at| at.point).collect();
+        let (samples, normals) = over_surface(bvh.mesh(), SAMPLES)
+            .into_iter()
+            .map(|at| (at.point, normal(&bvh.mesh().corners(at.triangle as usize))))
+            .unzip();
         let (name, stand_m) = (name.into(), (high.z - low.z) / 2.0);
-        Self { class: name.clone(), name, bvh, middle_m, stand_m, samples }
+        Self { class: name.clone(), name, bvh, middle_m, stand_m, samples, normals }
     }
 
     /// Sets the class.

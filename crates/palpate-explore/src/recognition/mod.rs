@@ -11,6 +11,7 @@ mod library;
 mod measurement;
 mod model;
 mod object_posterior;
+mod pairs;
 mod particles;
 mod peaks;
 mod pose_prior;

@@ -2,6 +2,7 @@
 //! again.
 
 use super::model::Model;
+use super::pairs;
 use super::particles::{Particles, log_sum_exp};
 use super::peaks;
 use nalgebra::Isometry3;
@@ -18,6 +19,10 @@ pub(super) const HOPELESS: f64 = -30.0;
 // heuristic: one in a thousand; several times as many as particles remain.
 const UNLIKELY: f64 = -6.9;
 const SEARCHED: u32 = 512;
+
+/// Numbers of poses by pairs of contacts, at each touch and in a wide search.
+// heuristic: as many as the guesses, and as those of the prior.
+const PAIRED: [usize; 2] = [64, 512];
 
 /// Nats by which peaks exceed the particles' evidence if the particles have missed a pose.
 // heuristic: Laplace's approximation is seldom off by that much.
@@ -65,6 +70,8 @@ impl ObjectPosterior {
         let turned = guesses.iter().flat_map(|x_wo| turns.iter().map(move |turn| x_wo * turn));
         let own = self.is_possible.then(|| self.particles.likeliest(model)).flatten();
         let mut starts: Vec<_> = turned.chain(own).chain(self.peaks.iter().copied()).collect();
+        let paired = if is_wide { PAIRED[1] } else { PAIRED[0] };
+        starts.extend(pairs::poses(model, paired, &mut self.random));
         if is_wide {
             starts.extend(model.prior.spread(model.object, SEARCHED, self.random.next_u32()));
         }

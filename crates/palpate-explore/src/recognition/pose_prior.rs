@@ -103,12 +103,21 @@ impl PosePrior {
         [x, y, z, is_free, is_free, is_turned]
     }
 
-    /// Returns the pose moved into the box.
+    /// Returns the pose moved into the box, with the nearest possible turn.
     pub(super) fn clamped(&self, object: &LibraryObject, x_wo: Isometry3<f64>) -> Isometry3<f64> {
         let (middle, half_m) = (self.middle(object), Vector3::from(self.half_width_m));
         let offset = x_wo.translation.vector - middle.coords;
         let within = offset.zip_map(&half_m, |off, half_m| off.clamp(-half_m, half_m));
-        Isometry3::from_parts((middle + within).into(), x_wo.rotation)
+        let rotation = match self.turn {
+            Turn::None => UnitQuaternion::identity(),
+            Turn::Yaw => {
+                let [_, _, z, w] = x_wo.rotation.coords.into();
+                let about_z = Quaternion::new(w, 0.0, 0.0, z);
+                UnitQuaternion::try_new(about_z, 1e-9).unwrap_or_default()
+            }
+            Turn::Free => x_wo.rotation,
+        };
+        Isometry3::from_parts((middle + within).into(), rotation)
     }
 
     /// Logarithm of the density of a possible pose, per m and per rad of a small motion.

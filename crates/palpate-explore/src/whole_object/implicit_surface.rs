@@ -140,7 +140,8 @@ impl ImplicitSurface {
         self.seen().iter().map(SeenSurface::rigid_error).collect()
     }
 
-    /// Fits the length scales' mean and noises by maximum likelihood and conditions on all touches.
+    /// Fits the length scales' mean, the exponent of the extents in them, and the noises by maximum
+    /// likelihood, and conditions on all touches.
     ///
     /// Coordinate search from the last optimum: a step along each parameter in turn, halved if none
     /// improves. The fit follows its optimum from touch to touch, and a large covariance is

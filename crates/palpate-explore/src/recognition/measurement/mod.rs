@@ -10,7 +10,7 @@ pub use view::ViewMeasurement;
 
 use super::library::LibraryObject;
 use likelihood::Residual;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use touch::TouchFit;
 
 /// Measurement of one touch or view.
@@ -35,6 +35,14 @@ impl Measurement {
     pub fn contact_w(&self) -> Option<Point3<f64>> {
         match self {
             Self::Touch(touch) => touch.contact_w(),
+            Self::View(_) => None,
+        }
+    }
+
+    /// Returns the point that a touch has met, in `W`, with its normal, if its sensor has one.
+    pub fn oriented_w(&self) -> Option<(Point3<f64>, Vector3<f64>)> {
+        match self {
+            Self::Touch(touch) => touch.oriented_w(),
             Self::View(_) => None,
         }
     }

@@ -98,6 +98,12 @@ impl TouchMeasurement {
         self.points.first().map(|point| point.p_w)
     }
 
+    /// Returns the point of contact, in `W`, with its normal; `None` without either.
+    pub fn oriented_w(&self) -> Option<(Point3<f64>, Vector3<f64>)> {
+        let point = self.points.first()?;
+        Some((point.p_w, point.normal_w?))
+    }
+
     /// Returns the residuals for `object` at the pose `x_wo`.
     pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> TouchFit {
         let reach_m = self.free_m + self.hull.radius_m;

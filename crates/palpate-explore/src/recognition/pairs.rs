@@ -1,0 +1,77 @@
+//! Poses at which contacts lie on an object: two contacts with their normals fix a pose, and two
+//! points of the surface at their distance, with normals at their angles, are soon found (Drost et
+//! al. 2010, Model globally, match locally). They are starts of climbs, so that noise is left to
+//! the likelihood.
+
+use super::library::LibraryObject;
+use super::model::Model;
+use crate::task::any_orthogonal;
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
+use rand::{Rng, RngExt};
+
+/// Number of points among which the second one of a pair is chosen.
+// heuristic: the best of them is about as near to the distance as points are to each other.
+const PARTNERS: usize = 32;
+
+/// Length that counts as much as 1 rad of the normals' angles, m.
+// heuristic: half the size of an object for a hand.
+const LEVER_M: f64 = 0.03;
+
+/// A point with the unit outward normal of its surface.
+pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
+
+/// Returns up to `count` poses at which two contacts lie on the object of `model`; none before two
+/// contacts with normals.
+pub(super) fn poses(model: &Model, count: usize, random: &mut impl Rng) -> Vec<Isometry3<f64>> {
+    let contacts: Vec<Oriented> =
+        model.evidence.iter().filter_map(|measurement| measurement.oriented_w()).collect();
+    if contacts.len() < 2 {
+        return Vec::new();
+    }
+    let mut pose = || {
+        let first = random.random_range(0..contacts.len());
+        let other = random.random_range(1..contacts.len());
+        let to_w = [contacts[first], contacts[(first + other) % contacts.len()]];
+        let from_o = partners(model.object, features(&to_w), random);
+        frame(&to_w) * frame(&from_o).inverse()
+    };
+    (0..count).map(|_| pose()).collect()
+}
+
+/// Returns a point of the surface, and that of some others whose pair has the features most alike.
+fn partners(object: &LibraryObject, wanted: [f64; 4], random: &mut impl Rng) -> [Oriented; 2] {
+    let count = object.samples.len();
+    let at = |number: usize| (object.samples[number], object.normals[number]);
+    let first = random.random_range(0..count);
+    let off = |other: &usize| {
+        let found = features(&[at(first), at(*other)]);
+        wanted.iter().zip(found).map(|(wanted, found)| (wanted - found).powi(2)).sum::<f64>()
+    };
+    let others = (0..PARTNERS).map(|_| random.random_range(0..count));
+    let best = others.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(first);
+    [at(first), at(best)]
+}
+
+/// Features of a pair that no motion changes: the distance over a lever, the cosines of both
+/// normals along the line between the points, and that between the normals.
+fn features([(p, n), (q, m)]: &[Oriented; 2]) -> [f64; 4] {
+    let between = q - p;
+    let along = between.try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
+    [between.norm() / LEVER_M, n.dot(&along), m.dot(&along), n.dot(m)]
+}
+
+/// Returns the frame of a pair: its origin between the points, x along the line from the first to
+/// the second, and z as close to the normals as that allows.
+fn frame([(p, n), (q, m)]: &[Oriented; 2]) -> Isometry3<f64> {
+    let x = UnitVector3::try_new(q - p, 1e-9).unwrap_or_else(|| {
+        UnitVector3::new_normalize(any_orthogonal(&UnitVector3::new_unchecked(*n)))
+    });
+    // Opposite normals leave their sum without a direction, equal ones their difference.
+    let across = [n + m, n - m].map(|of| of - *x * of.dot(&x));
+    let longest = across.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let z = longest.and_then(|across| UnitVector3::try_new(across, 1e-3));
+    let z = z.unwrap_or_else(|| UnitVector3::new_normalize(any_orthogonal(&x)));
+    let axes = Matrix3::from_columns(&[*x, z.cross(&x), *z]);
+    let rotation = UnitQuaternion::from(Rotation3::from_matrix_unchecked(axes));
+    Isometry3::from_parts(nalgebra::center(p, q).into(), rotation)
+}
