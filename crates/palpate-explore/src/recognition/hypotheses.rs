@@ -76,8 +76,8 @@ const GUESSES: usize = 2;
 // heuristic: half the size of an object for a hand.
 const ALIKE_M: f64 = 0.03;
 
-/// Counts of touches after which the prior may be searched once more for all objects, and the
-/// probability of the best object, and its log-odds against none of these, below which it is.
+/// Counts of touches after which all objects are looked for once more, over the whole prior while
+/// none is sure, and the probability of the best object, and its log-odds against none of these, below which it is.
 // heuristic: often at first, when touches are few and poses many.
 const SEARCHES: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
 const UNDECIDED: f64 = 0.9;
@@ -236,7 +236,7 @@ impl ObjectHypotheses {
             let predictive_nats = tested.predictive_nats + self.log_ratio(tested.class) - before;
             self.tested = Some(TestedClass { predictive_nats, ..tested });
         }
-        self.revise(SEARCHES.contains(&self.evidence.len()) && self.is_doubtful());
+        self.revise();
         self.name_likeliest();
     }
 
@@ -270,10 +270,12 @@ impl ObjectHypotheses {
         best < UNDECIDED || none.ln() > best.ln() - DOUBT
     }
 
-    /// Looks for poses that particles have missed, over the whole prior if `is_wide`: first for the
-    /// best object, then for all others at its poses too, so that none is left out whose shape fits
-    /// there.
-    fn revise(&mut self, is_wide: bool) {
+    /// Looks for poses that particles have missed, over the whole prior after some touches if in
+    /// doubt: first for the best object, then for the others at its poses too, so that none is left
+    /// out whose shape fits there. Those left out are looked at after some touches.
+    fn revise(&mut self) {
+        let is_due = SEARCHES.contains(&self.evidence.len());
+        let is_wide = is_due && self.is_doubtful();
         let Self { library, prior, evidence, noise, objects, settings, .. } = self;
         let log = |posterior: &ObjectPosterior| posterior.particles.log_evidence;
         let numbers = 0..objects.len();
@@ -286,7 +288,10 @@ impl ObjectHypotheses {
         objects[first].revise(&model(first), &search);
         let guesses: Vec<_> = objects[first].peaks.iter().take(GUESSES).copied().collect();
         let search = Search { guesses: &guesses, best: log(&objects[first]), ..search };
-        let others = objects.par_iter_mut().enumerate().filter(|(number, _)| *number != first);
+        let others = objects
+            .par_iter_mut()
+            .enumerate()
+            .filter(|(number, posterior)| *number != first && (posterior.is_possible || is_due));
         others.for_each(|(number, posterior)| posterior.revise(&model(number), &search));
         self.leave_out();
     }

@@ -11,8 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Logarithm of the probability, relative to the best object, below which an object is left out of
 /// further touches.
-// heuristic: three contacts that fit exactly would not make up for it.
-pub(super) const HOPELESS: f64 = -30.0;
+// heuristic: two contacts that fit exactly would not make up for it.
+pub(super) const HOPELESS: f64 = -20.0;
 
 /// Logarithm of the probability, relative to the best object, below which an object is unlikely;
 /// when it becomes so its pose is looked for among this many poses of the prior.
@@ -21,8 +21,8 @@ const UNLIKELY: f64 = -6.9;
 const SEARCHED: u32 = 512;
 
 /// Numbers of poses by pairs of contacts, at each touch and in a wide search.
-// heuristic: as many as the guesses, and as those of the prior.
-const PAIRED: [usize; 2] = [64, 512];
+// heuristic: twice as many as the guesses, and as many as those of the prior.
+const PAIRED: [usize; 2] = [128, 512];
 
 /// Nats by which peaks exceed the particles' evidence if the particles have missed a pose.
 // heuristic: Laplace's approximation is seldom off by that much.

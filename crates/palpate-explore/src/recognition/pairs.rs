@@ -75,3 +75,60 @@ fn frame([(p, n), (q, m)]: &[Oriented; 2]) -> Isometry3<f64> {
     let rotation = UnitQuaternion::from(Rotation3::from_matrix_unchecked(axes));
     Isometry3::from_parts(nalgebra::center(p, q).into(), rotation)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recognition::boxes::{NOISE, prior, touched_box, touches};
+    use crate::recognition::pose_prior::{PosePrior, Turn};
+    use palpate_gp::math::seed;
+    use proptest::prelude::*;
+
+    /// Contacts of the box are as far from its surface as their partners are off, at most; one of
+    /// few poses is as near as the points of the surface are to each other.
+    #[test]
+    fn both_contacts_lie_on_the_object() {
+        let (object, touches) = (touched_box(), touches());
+        let prior = PosePrior { turn: Turn::Free, ..prior() };
+        let model = Model { object: &object, prior: &prior, evidence: &touches, noise: NOISE };
+        let mut random = seed::stream(3, 0, "pairs");
+        let apart_m = |x_wo: &Isometry3<f64>| {
+            let contacts = touches.iter().filter_map(|touch| touch.contact_w());
+            contacts.map(|p_w| object.nearest(x_wo, &p_w).distance_m.abs()).fold(0.0, f64::max)
+        };
+        let found = poses(&model, 64, &mut random);
+        let nearest_m = found.iter().map(apart_m).fold(f64::INFINITY, f64::min);
+        assert!(found.len() == 64 && nearest_m < 1e-3, "{nearest_m}");
+        let one = Model { evidence: &touches[..1], ..model };
+        assert!(poses(&one, 64, &mut random).is_empty());
+    }
+
+    proptest! {
+        /// A motion changes no feature, and moves the frame with the pair.
+        #[test]
+        fn features_are_those_of_the_moved_pair(
+            points in prop::array::uniform2(prop::array::uniform3(-0.1f64..0.1)),
+            normals in prop::array::uniform2(prop::array::uniform3(-1f64..1.0)),
+            shift in prop::array::uniform3(-1f64..1.0),
+            turn in prop::array::uniform3(-3f64..3.0),
+        ) {
+            let [n, m] = normals.map(Vector3::from);
+            prop_assume!(n.norm() > 0.1 && m.norm() > 0.1);
+            let [p, q] = points.map(Point3::from);
+            prop_assume!((q - p).norm() > 1e-3);
+            let pair = [(p, n.normalize()), (q, m.normalize())];
+            let by = Isometry3::new(shift.into(), turn.into());
+            let moved = pair.map(|(p, n)| (by * p, by * n));
+            for (here, there) in features(&pair).into_iter().zip(features(&moved)) {
+                prop_assert!((here - there).abs() < 1e-9);
+            }
+            let x = frame(&pair).rotation * Vector3::x();
+            prop_assert!((x - (q - p).normalize()).norm() < 1e-9);
+            // The longer of sum and difference may change by rounding where both are equal.
+            let across = [pair[0].1 + pair[1].1, pair[0].1 - pair[1].1].map(|of| of.cross(&x).norm());
+            prop_assume!((across[0] - across[1]).abs() > 1e-6 && across[0].max(across[1]) > 0.01);
+            let off = frame(&moved).inv_mul(&(by * frame(&pair)));
+            prop_assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-6);
+        }
+    }
+}

@@ -22,8 +22,8 @@ const SETTLED: f64 = 0.01;
 
 /// Number of climbs, and the distance of their starts from each other, m; a turn counts by its way
 /// on the surface.
-// heuristic: an object looks alike at few poses, and a climb begins with 8 mm.
-const CLIMBS: usize = 4;
+// heuristic: an object looks alike at a few poses, and a climb begins with 8 mm.
+const CLIMBS: usize = 8;
 const APART_M: f64 = 0.005;
 const LEVER_M: f64 = 0.03;
 
