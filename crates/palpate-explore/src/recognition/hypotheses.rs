@@ -38,7 +38,8 @@ pub struct RecognitionSettings {
     /// finger 0.05.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outliers: Option<f64>,
-    /// Number of poses per object.
+    /// Number of poses per object; where many objects of the library are possible, they share
+    /// sixteen times as many.
     pub particles: u32,
 }
 
@@ -68,6 +69,10 @@ const NEAR_SHAPE: NoiseModel =
 
 /// Part of the poses that the hypothesis of a near shape has.
 const NEAR_PART: u32 = 4;
+
+/// Number of possible objects from which on they share the poses of so many.
+// heuristic: as many as a planner draws hypotheses are left for each of the likely ones.
+const SHARED: u32 = 16;
 
 /// Number of peaks of the best object that are starts for the others.
 const GUESSES: usize = 2;
@@ -120,6 +125,15 @@ pub struct PoseEstimate {
 /// distances; heuristics.
 const ESTIMATED: usize = 24;
 const POINT_STEP: usize = 8;
+
+/// Smallest number of poses per object.
+const FEWEST: u32 = 8;
+
+/// Returns the number of poses per object where `possible` objects are.
+fn shared(particles: u32, possible: usize) -> u32 {
+    let share = particles.saturating_mul(SHARED) / (possible as u32).max(1);
+    share.clamp(FEWEST, particles.max(FEWEST))
+}
 
 /// Posterior over objects and poses.
 #[derive(Clone)]
@@ -191,10 +205,16 @@ impl ObjectHypotheses {
             });
             posterior.collect()
         };
-        let objects = bank(made.settings.particles, made.noise);
-        let near = bank((made.settings.particles / NEAR_PART).max(8), NEAR_SHAPE);
+        let count = shared(made.settings.particles, made.library.objects().len());
+        let objects = bank(count, made.noise);
+        let near = bank((count / NEAR_PART).max(FEWEST), NEAR_SHAPE);
         (made.objects, made.near) = (objects, near);
         made
+    }
+
+    /// Number of poses of each possible object.
+    fn particles(&self) -> u32 {
+        shared(self.settings.particles, self.objects.iter().filter(|it| it.is_possible).count())
     }
 
     fn model<'a>(
@@ -242,12 +262,14 @@ impl ObjectHypotheses {
 
     /// Takes in new touches for all objects that are possible.
     fn update_all(&mut self) {
+        let wanted = self.particles() as usize;
         let Self { library, prior, evidence, noise, objects, near, .. } = self;
-        for (bank, noise) in [(objects, *noise), (near, NEAR_SHAPE)] {
+        let of_near = (wanted / NEAR_PART as usize).max(FEWEST as usize);
+        for (bank, noise, wanted) in [(objects, *noise, wanted), (near, NEAR_SHAPE, of_near)] {
             let each = bank.par_iter_mut().zip(library.objects());
             each.filter(|(posterior, _)| posterior.is_possible).for_each(|(posterior, object)| {
                 let model = Model { object, prior, evidence, noise };
-                posterior.particles.update(&model, &mut posterior.random);
+                posterior.particles.update(&model, wanted, &mut posterior.random);
             });
         }
     }
@@ -276,12 +298,13 @@ impl ObjectHypotheses {
     fn revise(&mut self) {
         let is_due = SEARCHES.contains(&self.evidence.len());
         let is_wide = is_due && self.is_doubtful();
-        let Self { library, prior, evidence, noise, objects, settings, .. } = self;
+        let wanted = self.particles() as usize;
+        let Self { library, prior, evidence, noise, objects, .. } = self;
         let log = |posterior: &ObjectPosterior| posterior.particles.log_evidence;
         let numbers = 0..objects.len();
         let first = numbers.max_by(|a, b| log(&objects[*a]).total_cmp(&log(&objects[*b])));
         let Some(first) = first else { return };
-        let (noise, wanted) = (*noise, settings.particles as usize);
+        let noise = *noise;
         let model =
             |number: usize| Model { object: &library.objects()[number], prior, evidence, noise };
         let search = Search { guesses: &[], best: log(&objects[first]), is_wide, wanted };

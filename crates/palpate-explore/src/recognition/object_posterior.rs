@@ -15,14 +15,16 @@ use rand_chacha::ChaCha8Rng;
 pub(super) const HOPELESS: f64 = -20.0;
 
 /// Logarithm of the probability, relative to the best object, below which an object is unlikely;
-/// when it becomes so its pose is looked for among this many poses of the prior.
-// heuristic: one in a thousand; several times as many as particles remain.
+/// when it becomes so its pose is looked for widely.
+// heuristic: one in a thousand.
 const UNLIKELY: f64 = -6.9;
-const SEARCHED: u32 = 512;
 
-/// Numbers of poses by pairs of contacts, at each touch and in a wide search.
-// heuristic: twice as many as the guesses, and as many as those of the prior.
+/// Numbers of poses by pairs of contacts, at each touch and in a wide search, and of the prior in a
+/// wide search.
+// heuristic: twice as many as the guesses; several times as many as particles remain; and without
+// pairs too.
 const PAIRED: [usize; 2] = [128, 512];
+const SEARCHED: u32 = 256;
 
 /// Nats by which peaks exceed the particles' evidence if the particles have missed a pose.
 // heuristic: Laplace's approximation is seldom off by that much.
@@ -119,7 +121,7 @@ mod tests {
         let mut posterior = |prior: &PosePrior| {
             let model = Model { prior, ..model };
             let mut particles = Particles::new(&Model { evidence: &[], ..model }, 64, &mut random);
-            particles.update(&model, &mut random);
+            particles.update(&model, 64, &mut random);
             ObjectPosterior::new(particles, seed::stream(2, 1, "particles"))
         };
         let expected = posterior(&prior).particles.log_evidence;

@@ -100,8 +100,9 @@ impl Particles {
         self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
     }
 
-    /// Takes in those of the model's evidence that is new.
-    pub fn update(&mut self, model: &Model, random: &mut impl Rng) {
+    /// Takes in those of the model's evidence that is new; `wanted` poses remain after a resampling.
+    pub fn update(&mut self, model: &Model, wanted: usize, random: &mut impl Rng) {
+        self.wanted = wanted;
         let known = self.particles.first().map_or(0, |particle| particle.fits.len());
         for particle in &mut self.particles {
             let new = model.evidence[known..].iter();
@@ -323,9 +324,9 @@ mod tests {
             let mut particles = Particles::new(&model(0), 256, &mut random);
             // One after another, or both at once as in a restart.
             if number % 2 == 0 {
-                particles.update(&model(1), &mut random);
+                particles.update(&model(1), 256, &mut random);
             }
-            particles.update(&model(2), &mut random);
+            particles.update(&model(2), 256, &mut random);
             evidences.push(particles.log_evidence);
             let mean = particles.weighted().fold(Vector3::zeros(), |sum, (x_wo, weight)| {
                 sum + x_wo.translation.vector * weight

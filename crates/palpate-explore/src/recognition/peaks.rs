@@ -20,6 +20,10 @@ const STEPS: usize = 6;
 const HALVINGS: i32 = 3;
 const SETTLED: f64 = 0.01;
 
+/// Number of starts that are compared by all evidence, beside the contacts.
+// heuristic: several for each climb; a sweep of the finger costs four times a distance.
+const PROMISING: usize = 64;
+
 /// Number of climbs, and the distance of their starts from each other, m; a turn counts by its way
 /// on the surface.
 // heuristic: an object looks alike at a few poses, and a climb begins with 8 mm.
@@ -52,7 +56,8 @@ pub(super) fn log_mass(peaks: &[Peak]) -> f64 {
 pub(super) fn find(model: &Model, starts: impl Iterator<Item = Isometry3<f64>>) -> Vec<Peak> {
     let score = |x_wo: &Isometry3<f64>| model.log_likelihood(&model.fits(x_wo), CLIMB_M[0]);
     let starts = starts.map(|x_wo| model.prior.clamped(model.object, x_wo));
-    let mut scored: Vec<_> = starts.map(|x_wo| (score(&x_wo), x_wo)).collect();
+    let promising = promising(model, starts.collect());
+    let mut scored: Vec<_> = promising.into_iter().map(|x_wo| (score(&x_wo), x_wo)).collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<Isometry3<f64>> = Vec::new();
     for (_, x_wo) in scored {
@@ -75,6 +80,20 @@ pub(super) fn find(model: &Model, starts: impl Iterator<Item = Isometry3<f64>>) 
     }
     peaks.sort_by(|a, b| b.log_mass.total_cmp(&a.log_mass));
     peaks
+}
+
+/// Returns those starts with the contacts nearest to the object; all before a contact.
+fn promising(model: &Model, starts: Vec<Isometry3<f64>>) -> Vec<Isometry3<f64>> {
+    let contacts: Vec<_> = model.evidence.iter().filter_map(|it| it.contact_w()).collect();
+    if contacts.is_empty() {
+        return starts;
+    }
+    let off_m2 = |x_wo: &Isometry3<f64>| -> f64 {
+        contacts.iter().map(|p_w| model.object.nearest(x_wo, p_w).distance_m.powi(2)).sum()
+    };
+    let mut scored: Vec<_> = starts.into_iter().map(|x_wo| (off_m2(&x_wo), x_wo)).collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    scored.into_iter().take(PROMISING).map(|(_, x_wo)| x_wo).collect()
 }
 
 fn distance_m(from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
