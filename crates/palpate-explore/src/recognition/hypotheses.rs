@@ -39,7 +39,7 @@ pub struct RecognitionSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outliers: Option<f64>,
     /// Number of poses per object; where many objects of the library are possible, they share
-    /// sixteen times as many.
+    /// 32 times as many.
     pub particles: u32,
 }
 
@@ -72,7 +72,7 @@ const NEAR_PART: u32 = 4;
 
 /// Number of possible objects from which on they share the poses of so many.
 // heuristic: as many as a planner draws hypotheses are left for each of the likely ones.
-const SHARED: u32 = 16;
+const SHARED: u32 = 32;
 
 /// Number of peaks of the best object that are starts for the others.
 const GUESSES: usize = 2;
@@ -131,7 +131,9 @@ const FEWEST: u32 = 8;
 
 /// Returns the number of poses per object where `possible` objects are.
 fn shared(particles: u32, possible: usize) -> u32 {
-    let share = particles.saturating_mul(SHARED) / (possible as u32).max(1);
+    let share = particles
+        .saturating_mul(std::env::var("SHARED").map_or(SHARED, |v| v.parse().unwrap()))
+        / (possible as u32).max(1);
     share.clamp(FEWEST, particles.max(FEWEST))
 }
 

@@ -9,9 +9,9 @@ use crate::task::any_orthogonal;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 use rand::{Rng, RngExt};
 
-/// Number of points among which the second one of a pair is chosen.
-// heuristic: the best of them is about as near to the distance as points are to each other.
-const PARTNERS: usize = 32;
+/// Number of points from which the first one of a pair is chosen.
+// heuristic: few, so that poses differ.
+const FIRSTS: usize = 4;
 
 /// Length that counts as much as 1 rad of the normals' angles, m.
 // heuristic: half the size of an object for a hand.
@@ -23,8 +23,9 @@ pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 /// Returns up to `count` poses at which two contacts lie on the object of `model`; none before two
 /// contacts with normals.
 pub(super) fn poses(model: &Model, count: usize, random: &mut impl Rng) -> Vec<Isometry3<f64>> {
+    let touched = model.evidence.iter().filter_map(|it| it.touched_w());
     let contacts: Vec<Oriented> =
-        model.evidence.iter().filter_map(|measurement| measurement.oriented_w()).collect();
+        touched.filter_map(|(p_w, normal_w)| Some((p_w, normal_w?))).collect();
     if contacts.len() < 2 {
         return Vec::new();
     }
@@ -38,18 +39,19 @@ pub(super) fn poses(model: &Model, count: usize, random: &mut impl Rng) -> Vec<I
     (0..count).map(|_| pose()).collect()
 }
 
-/// Returns a point of the surface, and that of some others whose pair has the features most alike.
+/// Returns the points of the surface whose pair has the features most alike, the first one of some
+/// at random.
 fn partners(object: &LibraryObject, wanted: [f64; 4], random: &mut impl Rng) -> [Oriented; 2] {
     let count = object.samples.len();
     let at = |number: usize| (object.samples[number], object.normals[number]);
-    let first = random.random_range(0..count);
-    let off = |other: &usize| {
-        let found = features(&[at(first), at(*other)]);
+    let off = |pair: &[Oriented; 2]| {
+        let found = features(pair);
         wanted.iter().zip(found).map(|(wanted, found)| (wanted - found).powi(2)).sum::<f64>()
     };
-    let others = (0..PARTNERS).map(|_| random.random_range(0..count));
-    let best = others.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(first);
-    [at(first), at(best)]
+    let firsts: [usize; FIRSTS] = std::array::from_fn(|_| random.random_range(0..count));
+    let pairs = firsts.iter().flat_map(|&p| (0..count).map(move |q| [at(p), at(q)]));
+    let best = pairs.map(|pair| (off(&pair), pair)).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or([at(0), at(0)], |(_, pair)| pair)
 }
 
 /// Features of a pair that no motion changes: the distance over a lever, the cosines of both

@@ -4,6 +4,7 @@
 //! evidence anew: a mixture of Laplace's approximations, each also with wider tails (Hesterberg
 //! 1995).
 
+use super::library::Nearest;
 use super::model::{Model, Quadratic};
 use super::particles::{Particle, Particles, free_normals, log_sum_exp, systematic};
 use super::pose_prior::{PosePrior, motion, moved};
@@ -82,14 +83,21 @@ pub(super) fn find(model: &Model, starts: impl Iterator<Item = Isometry3<f64>>) 
     peaks
 }
 
-/// Returns those starts with the contacts nearest to the object; all before a contact.
+/// Returns those starts at which the contacts lie best on the object; all before a contact.
 fn promising(model: &Model, starts: Vec<Isometry3<f64>>) -> Vec<Isometry3<f64>> {
-    let contacts: Vec<_> = model.evidence.iter().filter_map(|it| it.contact_w()).collect();
+    let contacts: Vec<_> = model.evidence.iter().filter_map(|it| it.touched_w()).collect();
     if contacts.is_empty() {
         return starts;
     }
+    let most_m = 2.0 * CLIMB_M[0];
     let off_m2 = |x_wo: &Isometry3<f64>| -> f64 {
-        contacts.iter().map(|p_w| model.object.nearest(x_wo, p_w).distance_m.powi(2)).sum()
+        let each = contacts.iter().map(|(p_w, normal_w)| {
+            let Nearest { face_w, distance_m, .. } = model.object.nearest(x_wo, p_w);
+            // Near a thin part, the nearest face is often the one behind.
+            let turned_m = normal_w.map_or(0.0, |to_w| LEVER_M * (face_w - to_w).norm());
+            distance_m.powi(2) + turned_m.min(most_m).powi(2)
+        });
+        each.sum()
     };
     let mut scored: Vec<_> = starts.into_iter().map(|x_wo| (off_m2(&x_wo), x_wo)).collect();
     scored.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -33,16 +33,13 @@ pub enum MeasurementFit {
 impl Measurement {
     /// Returns the point that a touch has met, in `W`.
     pub fn contact_w(&self) -> Option<Point3<f64>> {
-        match self {
-            Self::Touch(touch) => touch.contact_w(),
-            Self::View(_) => None,
-        }
+        Some(self.touched_w()?.0)
     }
 
-    /// Returns the point that a touch has met, in `W`, with its normal, if its sensor has one.
-    pub fn oriented_w(&self) -> Option<(Point3<f64>, Vector3<f64>)> {
+    /// Returns the point that a touch has met, in `W`, and its normal, if its sensor has one.
+    pub fn touched_w(&self) -> Option<(Point3<f64>, Option<Vector3<f64>>)> {
         match self {
-            Self::Touch(touch) => touch.oriented_w(),
+            Self::Touch(touch) => touch.touched_w(),
             Self::View(_) => None,
         }
     }

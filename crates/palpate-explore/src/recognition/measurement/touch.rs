@@ -93,15 +93,9 @@ impl TouchMeasurement {
         Some(Self { hull, ahead_w: *ahead_w, free_m, slack_m, points, face_w })
     }
 
-    /// Returns the point of contact, in `W`; `None` for a miss.
-    pub fn contact_w(&self) -> Option<Point3<f64>> {
-        self.points.first().map(|point| point.p_w)
-    }
-
-    /// Returns the point of contact, in `W`, with its normal; `None` without either.
-    pub fn oriented_w(&self) -> Option<(Point3<f64>, Vector3<f64>)> {
-        let point = self.points.first()?;
-        Some((point.p_w, point.normal_w?))
+    /// Returns the point of contact, in `W`, and its normal, if it is known; `None` for a miss.
+    pub fn touched_w(&self) -> Option<(Point3<f64>, Option<Vector3<f64>>)> {
+        self.points.first().map(|point| (point.p_w, point.normal_w))
     }
 
     /// Returns the residuals for `object` at the pose `x_wo`.
