@@ -82,7 +82,8 @@ const GUESSES: usize = 2;
 const ALIKE_M: f64 = 0.03;
 
 /// Counts of touches after which all objects are looked for once more, over the whole prior while
-/// none is sure, and the probability of the best object, and its log-odds against none of these, below which it is.
+/// none is sure, and the probability of the best object, and its log-odds against none of these,
+/// below which it is not.
 // heuristic: often at first, when touches are few and poses many.
 const SEARCHES: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
 const UNDECIDED: f64 = 0.9;

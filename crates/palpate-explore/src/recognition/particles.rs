@@ -100,7 +100,7 @@ impl Particles {
         self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
     }
 
-    /// Takes in those of the model's evidence that is new; `wanted` poses remain after a resampling.
+    /// Takes in those of the model's evidence that is new; `wanted` poses remain after resampling.
     pub fn update(&mut self, model: &Model, wanted: usize, random: &mut impl Rng) {
         self.wanted = wanted;
         let known = self.particles.first().map_or(0, |particle| particle.fits.len());
@@ -123,6 +123,7 @@ impl Particles {
                 for _ in 0..MOVES {
                     self.advance(model, (known, tau_m), STEP, random);
                 }
+                self.separate(model, (known, tau_m), random);
             }
         }
     }
