@@ -115,6 +115,18 @@ TABLES = {
         ],
         first="objects, planner",
     ),
+    ("docs/benchmark.md", "ycb"): Selection(
+        [
+            ("n trials", show("n", decimals=0)),
+            ("Chamfer, %, after 60", show("chamfer_share_after_60", 100, 2)),
+            ("reachable within 2 mm, %", show("within_2_mm_after_60", 100, 1)),
+            ("gap closed, %", show("gap_closed", 100, 0)),
+            ("right after 10", show("right_after_10", decimals=2)),
+            ("ADD-S, mm", show("add_s_m", 1000, 2)),
+            ("within stated distance", show("pose_coverage", decimals=2)),
+        ],
+        first="protocol, planner",
+    ),
     ("docs/paper.md", "paper-finger"): Selection(
         [
             *((planner, show(f"{planner}_rmse_m", 1000, 2)) for planner in ("active", "sobol", "random")),
