@@ -132,9 +132,7 @@ const FEWEST: u32 = 8;
 
 /// Returns the number of poses per object where `possible` objects are.
 fn shared(particles: u32, possible: usize) -> u32 {
-    let share = particles
-        .saturating_mul(std::env::var("SHARED").map_or(SHARED, |v| v.parse().unwrap()))
-        / (possible as u32).max(1);
+    let share = particles.saturating_mul(SHARED) / (possible as u32).max(1);
     share.clamp(FEWEST, particles.max(FEWEST))
 }
 

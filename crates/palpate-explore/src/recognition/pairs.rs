@@ -4,6 +4,7 @@
 //! the likelihood.
 
 use super::library::LibraryObject;
+use super::measurement::LEVER_M;
 use super::model::Model;
 use crate::task::any_orthogonal;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
@@ -12,10 +13,6 @@ use rand::{Rng, RngExt};
 /// Number of points from which the first one of a pair is chosen.
 // heuristic: few, so that poses differ.
 const FIRSTS: usize = 4;
-
-/// Length that counts as much as 1 rad of the normals' angles, m.
-// heuristic: half the size of an object for a hand.
-const LEVER_M: f64 = 0.03;
 
 /// A point with the unit outward normal of its surface.
 pub(super) type Oriented = (Point3<f64>, Vector3<f64>);

@@ -5,6 +5,7 @@
 //! 1995).
 
 use super::library::Nearest;
+use super::measurement::LEVER_M;
 use super::model::{Model, Quadratic};
 use super::particles::{Particle, Particles, free_normals, log_sum_exp, systematic};
 use super::pose_prior::{PosePrior, motion, moved};
@@ -30,7 +31,6 @@ const PROMISING: usize = 64;
 // heuristic: an object looks alike at a few poses, and a climb begins with 8 mm.
 const CLIMBS: usize = 8;
 const APART_M: f64 = 0.005;
-const LEVER_M: f64 = 0.03;
 
 /// Deviations of the proposal over those of the approximation, half of the draws each.
 // heuristic: edges bend the posterior, so that it has wider tails.

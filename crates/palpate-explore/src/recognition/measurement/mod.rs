@@ -5,7 +5,7 @@ mod touch;
 mod view;
 
 pub use likelihood::{LogLikelihood, NoiseModel};
-pub use touch::{TouchMeasurement, before_m, hull};
+pub use touch::{LEVER_M, TouchMeasurement, before_m, hull};
 pub use view::ViewMeasurement;
 
 use super::library::LibraryObject;

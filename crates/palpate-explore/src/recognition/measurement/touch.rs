@@ -21,9 +21,9 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use palpate_geometry::sweep::Capsule;
 use std::f64::consts::PI;
 
-/// Lever at which a turn counts as much as a distance, m, for the temperature.
+/// Lever at which a turn counts as much as a distance, m.
 // heuristic: half the size of an object for a hand.
-const LEVER_M: f64 = 0.03;
+pub const LEVER_M: f64 = 0.03;
 
 /// Probability of a miss on an approach to an unknown shape.
 // heuristic: undecided.
