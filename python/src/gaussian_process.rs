@@ -57,6 +57,7 @@ impl Fitted {
             signal_sd: signal.into(),
             touch_noise: TouchNoise::Fitted,
             start_sd: None,
+            common_ratio: None,
         };
         py.detach(|| {
             let fit = search_box.fit(kernel, &observations);

@@ -30,6 +30,7 @@ fn search_box(mean: MeanModel, length_scales: Vec<Range>) -> SearchBox {
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
         start_sd: None,
+        common_ratio: None,
     }
 }
 

@@ -23,6 +23,7 @@ fn four_thousand_touches_need_at_most_three_squares_of_doubles() {
         length_scales: vec![0.05, 0.08],
         noise_sd: 1e-2,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.0,
     };
     let gradient = doubles_per_square(n, || {

@@ -27,6 +27,7 @@ pub fn hyperparameters() -> Hyperparameters {
         length_scales: vec![0.2, 0.4],
         noise_sd: 1e-3,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.0,
     }
 }
@@ -41,6 +42,7 @@ pub fn search_box() -> SearchBox {
         touch_noise: TouchNoise::Fitted,
 
         start_sd: None,
+        common_ratio: None,
         slope_noise_ratio: None,
     }
 }

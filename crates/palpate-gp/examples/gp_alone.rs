@@ -22,6 +22,7 @@ fn main() -> Result<(), CovarianceError> {
         touch_noise: TouchNoise::Fitted,
 
         start_sd: None,
+        common_ratio: None,
         slope_noise_ratio: None,
     };
     let grid: Vec<[f64; 1]> = (0..=400).map(|i| [-2.0 + 0.01 * f64::from(i)]).collect();

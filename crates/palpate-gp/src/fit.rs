@@ -6,7 +6,7 @@ use super::kernel::{Hyperparameters, KERNELS, Kernel};
 use super::likelihood::{Likelihood, ProfiledLikelihood};
 use super::observations::Observations;
 use super::scan::{Grid, Scan};
-use super::search_box::{SearchBox, SignalModel, TouchNoise};
+use super::search_box::{Range, SearchBox, SignalModel, TouchNoise};
 use crate::math::bfgs::{BfgsClimb, BfgsOptions, climb};
 use crate::math::optimize::{Bounds, Optimum, Stop};
 use schemars::JsonSchema;
@@ -164,7 +164,8 @@ impl FitState {
                 self.curvature = curvature;
                 let (lengths, noise) = sought.parameters(&x);
                 let at = Hyperparameters::new(profile.signal_sd, lengths, noise, profile.mean);
-                (at, profile.log_likelihood, stop)
+                let common_sd = sought.common_ratio.map(|_| noise.known * profile.signal_sd);
+                (Hyperparameters { common_sd, ..at }, profile.log_likelihood, stop)
             }
             None => {
                 self.curvature.clear();
@@ -383,11 +384,13 @@ impl<'a> Search<'a> {
         let grid =
             Grid::new(Bounds { lower: &lower, upper: &upper }, self.sought.length_scales.len());
         let signal = self.sought.start_sd.filter(|_| self.sought.is_signal_searched());
+        let middle = |range: Range| (range.low * range.high).sqrt();
+        let last = signal.or(self.sought.common_ratio.map(middle));
         let place = |index: usize| {
             let mut place = grid.place(index);
             let ends = bounds.lower.iter().zip(bounds.upper);
             place.iter_mut().zip(ends).for_each(|(at, (low, high))| *at = at.clamp(*low, *high));
-            place.extend(signal.map(f64::ln));
+            place.extend(last.map(f64::ln));
             place
         };
         let known = scan.map(|scan| {

@@ -30,6 +30,10 @@ pub struct Hyperparameters {
     /// Standard deviation of an observed slope's error; 0 without observed slopes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub slope_noise_sd: f64,
+    /// Standard deviation of an error in common, where its size is fitted; `None` where observations
+    /// state it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub common_sd: Option<f64>,
     /// Prior mean, to which the belief returns far from all observations.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub mean: f64,
@@ -43,15 +47,22 @@ impl Hyperparameters {
             length_scales,
             noise_sd: noise.height * signal_sd,
             slope_noise_sd: noise.slope * signal_sd,
+            common_sd: None,
             mean,
         }
+    }
+
+    /// Standard deviation of the error of a touch that has none in common with those before: that of
+    /// its own, and one in common whose size is fitted.
+    pub fn touch_sd(&self) -> f64 {
+        self.common_sd.map_or(self.noise_sd, |common_sd| self.noise_sd.hypot(common_sd))
     }
 
     /// Returns the noise in units of the signal.
     pub fn noise_ratio(&self) -> NoiseRatio {
         let [height, slope] =
             [self.noise_sd, self.slope_noise_sd].map(|noise_sd| noise_sd / self.signal_sd);
-        NoiseRatio { height, slope, known: 1.0 / self.signal_sd }
+        NoiseRatio { height, slope, known: self.common_sd.unwrap_or(1.0) / self.signal_sd }
     }
 }
 

@@ -30,6 +30,7 @@
 //!     signal_sd: (1e-4, 1.0).into(),
 //!     touch_noise: TouchNoise::Fitted,
 //!     start_sd: None,
+//!     common_ratio: None,
 //!     slope_noise_ratio: None,
 //! };
 //! let fit = search_box.fit(&SquaredExponential, &observations);

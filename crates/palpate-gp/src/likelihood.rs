@@ -118,7 +118,7 @@ impl<'a> Likelihood<'a> {
     /// Returns the log marginal likelihood with signal_sd according to `scale`. A `gradient` is
     /// written with respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of
     /// the slope noise ratio if there is space; it includes the prior of signal_sd. If signal_sd is
-    /// searched, its derivative is the last.
+    /// searched, or the ratio of errors in common, its derivative is the last.
     ///
     /// # Errors
     /// [`CovarianceError`] if the covariance cannot be factored.
@@ -142,6 +142,10 @@ impl<'a> Likelihood<'a> {
             let by_signal =
                 |all: &Self| fit / signal2 - count as f64 - all.by_known(signal2, noise);
             match scale {
+                SignalModel::Profiled(_) if noise.known > 0.0 => {
+                    let by_known = self.by_known(signal2, noise);
+                    gradient.iter_mut().next_back().into_iter().for_each(|last| *last = by_known);
+                }
                 SignalModel::Profiled(_) => {}
                 // With a known noise, signal_sd decreases as the ratio increases.
                 SignalModel::KnownNoise(_) => {

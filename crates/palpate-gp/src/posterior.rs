@@ -284,8 +284,10 @@ impl Posterior {
     /// Multiplies every standard deviation, of surface and noise, by `factor`; the means are
     /// unchanged.
     pub fn inflate(&mut self, factor: f64) {
-        let Hyperparameters { signal_sd, noise_sd, slope_noise_sd, .. } = &mut self.hyperparameters;
-        [signal_sd, noise_sd, slope_noise_sd].into_iter().for_each(|sd| *sd *= factor);
+        let Hyperparameters { signal_sd, noise_sd, slope_noise_sd, common_sd, .. } =
+            &mut self.hyperparameters;
+        let sds = [signal_sd, noise_sd, slope_noise_sd].into_iter().chain(common_sd);
+        sds.for_each(|sd| *sd *= factor);
     }
 
     /// The hyperparameters of the posterior.

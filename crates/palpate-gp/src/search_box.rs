@@ -29,6 +29,10 @@ pub struct SearchBox {
     /// Start of a search for the signal's standard deviation, which is needed for observations with
     /// errors of known size: these do not grow with the signal, so that it has no closed form.
     pub start_sd: Option<f64>,
+    /// Bounds of the errors in common, as a fraction of the signal's standard deviation, where they
+    /// are of unknown size: loadings are then in units of it. Only with a fitted touch noise and
+    /// without a search for the signal.
+    pub common_ratio: Option<Range>,
 }
 
 /// Model of the touch noise's standard deviation, in the unit of the heights.
@@ -44,8 +48,8 @@ pub enum TouchNoise {
 }
 
 impl SearchBox {
-    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio and signal if
-    /// they are searched.
+    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio, and signal or
+    /// errors in common, if they are searched.
     pub(super) fn ranges(&self) -> impl Iterator<Item = Range> {
         // A known noise and a range of the signal determine a range of their ratio.
         let noise_ratio = match self.touch_noise {
@@ -56,7 +60,7 @@ impl SearchBox {
         };
         let noises = [noise_ratio].into_iter().chain(self.slope_noise_ratio);
         let signal = self.is_signal_searched().then_some(self.signal_sd);
-        self.length_scales.iter().copied().chain(noises).chain(signal)
+        self.length_scales.iter().copied().chain(noises).chain(signal).chain(self.common_ratio)
     }
 
     /// Whether the signal's standard deviation is a parameter of the search; with a known noise it
@@ -79,13 +83,14 @@ impl SearchBox {
     /// Returns the noise ratios among [`parameters`](Self::parameters).
     pub(super) fn noise(&self, logs: &[f64]) -> NoiseRatio {
         let (noises, searched) = match &logs[self.length_scales.len().min(logs.len())..] {
-            [noises @ .., last] if self.is_signal_searched() => (noises, Some(last.exp())),
+            [noises @ .., last] if self.is_signal_searched() => (noises, Some((-last).exp())),
+            [noises @ .., last] if self.common_ratio.is_some() => (noises, Some(last.exp())),
             noises => (noises, None),
         };
         let [height, slope] = [0, 1].map(|i| noises.get(i).map_or(0.0, |log: &f64| log.exp()));
         let known = match (self.touch_noise, searched) {
             (TouchNoise::Known(noise_sd), _) => height / noise_sd,
-            (_, signal_sd) => signal_sd.map_or(0.0, f64::recip),
+            (_, searched) => searched.unwrap_or(0.0),
         };
         NoiseRatio { height, slope, known }
     }
@@ -97,8 +102,10 @@ impl SearchBox {
         let SearchBox { signal_sd, .. } = self;
         let signal = at.signal_sd.clamp(signal_sd.low, signal_sd.high);
         let signal = self.is_signal_searched().then_some(signal);
+        let common = self.common_ratio.map(|range| noise.known.clamp(range.low, range.high));
         let noises = [noise.height].into_iter().chain(slope);
-        at.length_scales.iter().copied().chain(noises).chain(signal).map(f64::ln).collect()
+        let all = at.length_scales.iter().copied().chain(noises).chain(signal).chain(common);
+        all.map(f64::ln).collect()
     }
 
     /// Indices of the noise ratios among the parameters.

@@ -93,6 +93,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
             length_scales: zone.extents_m().iter().map(|side| 0.3 * side).collect(),
             noise_sd: 1e-4,
             slope_noise_sd: 0.0,
+            common_sd: None,
             mean: 0.0,
         },
         log_likelihood: 0.0,

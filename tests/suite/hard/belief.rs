@@ -154,6 +154,7 @@ fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
         start_sd: None,
+        common_ratio: None,
     };
     let fit = search.fit(&KERNEL, &all_of);
     if fit.stop == Stop::Failed {
@@ -169,6 +170,7 @@ fn given(touches: &[(f64, f64)], length: f64, noise_ratio: f64) -> Outcome {
         length_scales: vec![length],
         noise_sd: noise_ratio,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.0,
     };
     laws(at, touches, f64::INFINITY)

@@ -38,6 +38,7 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
         start_sd: None,
+        common_ratio: None,
     }
 }
 
@@ -264,6 +265,7 @@ fn a_thousand_additions_equal_one_factorisation() {
         length_scales: vec![0.02],
         noise_sd: 0.05,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.0,
     };
     let mut grown = Posterior::new(&KERNEL, at.clone(), Observations::new(1)).unwrap();

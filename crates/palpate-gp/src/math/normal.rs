@@ -48,6 +48,18 @@ pub fn inverse_mills(z: f64) -> f64 {
     -z - u + 2.0 * u * u * u
 }
 
+/// Returns the calibration factor of the 95 % band: the smallest that covers (n + 1)·95 % of the n
+/// leave-one-out z-scores `z`, or all of them if that exceeds n, in units of 1.96. It is at least
+/// 1, since a few contacts do not show the largest deviations.
+pub fn band_factor(z: &[f64]) -> f64 {
+    let mut far: Vec<f64> = z.iter().map(|z| z.abs()).collect();
+    far.sort_by(f64::total_cmp);
+    let held = (0.95 * (far.len() + 1) as f64).ceil() as usize;
+    let last = far.get(held.saturating_sub(1)).or(far.last());
+    let factor = last.map_or(1.0, |z| z / BAND_95);
+    if factor.is_finite() { factor.max(1.0) } else { 1.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

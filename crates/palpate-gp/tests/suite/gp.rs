@@ -44,6 +44,7 @@ impl Case {
             length_scales: self.length_scales.clone(),
             noise_sd: self.noise_sd,
             slope_noise_sd: 0.0,
+            common_sd: None,
             mean: 0.0,
         }
     }
@@ -181,6 +182,7 @@ fn one_touch_gives_the_closed_form() {
         length_scales: vec![0.5],
         noise_sd: 0.1,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.0,
     };
     let ours = posterior(at, observations([(&[0.3][..], 1.5)]));
@@ -200,6 +202,7 @@ fn coinciding_places_without_noise_need_jitter_and_say_so() {
         length_scales: vec![1.0],
         noise_sd: 0.0,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.0,
     };
     let twice = observations([(&[0.0][..], 1.0), (&[0.0][..], 1.0), (&[0.5][..], 0.0)]);
@@ -217,6 +220,7 @@ fn any_belief() -> impl Strategy<Value = (Hyperparameters, Vec<([f64; 2], f64)>)
             length_scales: vec![a, b],
             noise_sd: s * ratio,
             slope_noise_sd: 0.0,
+            common_sd: None,
             mean: 0.0,
         }
     });

@@ -25,6 +25,7 @@ fn hyperparameters(length: f64) -> Hyperparameters {
         length_scales: vec![length, 1.4 * length],
         noise_sd: 0.02,
         slope_noise_sd: 0.0,
+        common_sd: None,
         mean: 0.1,
     }
 }

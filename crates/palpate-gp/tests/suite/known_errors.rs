@@ -224,6 +224,7 @@ fn a_common_offset_is_removed() {
         signal_sd: (0.1, 10.0).into(),
         touch_noise: TouchNoise::Fitted,
         start_sd: Some(1.0),
+        common_ratio: None,
     };
     let posterior = |offset: f64| {
         let mut sequence = RefitSequence::new(&Matern52);

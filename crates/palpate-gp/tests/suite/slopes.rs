@@ -49,6 +49,7 @@ fn any_parameters() -> impl Strategy<Value = Hyperparameters> {
         length_scales: vec![a, b],
         noise_sd: signal_sd * noise,
         slope_noise_sd: signal_sd * slope_noise,
+        common_sd: None,
         mean: 0.1,
     })
 }
@@ -79,6 +80,7 @@ fn the_mean_has_the_slope_that_was_observed() {
         length_scales: vec![0.5, 0.8],
         noise_sd: 1e-6,
         slope_noise_sd: 1e-6,
+        common_sd: None,
         mean: 0.0,
     };
     let touches: Vec<Touch> = (0..6)
@@ -170,6 +172,7 @@ proptest! {
                     length_scales: lengths.into(),
                     noise_sd,
                     slope_noise_sd: 2.0 * noise_sd * 2f64.sqrt() / (2.0 * HALF),
+                    common_sd: None,
                     mean: 0.0,
                 };
                 likelihood.value_gradient(&at, &mut []).unwrap()
@@ -355,6 +358,7 @@ fn what_cannot_be_extended() {
         length_scales: vec![1.0, 1.0],
         noise_sd: 0.1,
         slope_noise_sd: 0.1,
+        common_sd: None,
         mean: 0.0,
     };
     let begun = [touch(0.0, 1.0), touch(0.5, 1.0)];
