@@ -141,8 +141,8 @@ impl From<SeenSurface> for Evidence {
 pub struct SurfacePoints {
     /// The points.
     pub points: Vec<Contact>,
-    /// Source of an error that the points have in common, of the size that each states; if omitted,
-    /// each point has an error of its own.
+    /// Source of an error that the points have in common; if omitted, each point has an error of its
+    /// own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<ErrorSource>,
 }
@@ -151,8 +151,12 @@ pub struct SurfacePoints {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorSource {
-    /// One stroke: the bias of its sensor stays the same while it slides.
+    /// One stroke: the bias of its sensor, of the size that each point states, stays the same while
+    /// it slides.
     Stroke,
+    /// One grasp, posture of an arm, or session: the robot's pose is off by one vector, whose size
+    /// is learned. Not together with strokes and views.
+    Posture,
 }
 
 impl SurfacePoints {

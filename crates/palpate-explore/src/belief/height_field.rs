@@ -3,7 +3,7 @@
 use super::mean_grid::MeanGrid;
 use crate::evidence::{Contact, End, FreeVolume};
 use crate::free_space::FreeSpaceBound;
-use crate::gp_settings::{Band, BandName, GpSettings};
+use crate::gp_settings::{Band, BandName, COMMON_ERROR_M, GpSettings};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
@@ -14,7 +14,7 @@ use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::fit::KernelSelection;
 use palpate_gp::inducing::InducingPosterior;
-use palpate_gp::math::normal::BAND_95;
+use palpate_gp::math::normal::band_factor;
 use palpate_gp::posterior::{Posterior, Scratch};
 use palpate_gp::{
     Hyperparameters, KnownError, Observation, Observations, Range, SearchBox, TouchNoise,
@@ -27,6 +27,10 @@ use std::sync::OnceLock;
 /// the camera's pose.
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
+
+/// Bounds of an error in common of unknown size, as fractions of the signal's standard deviation.
+// heuristic: from a ten-thousandth, which no contact shows, to as much as the surface.
+const COMMON_RANGE: [f64; 2] = [1e-4, 1.0];
 
 /// Height of a contact above a seen element at its place, m, and in standard deviations of the
 /// element, beyond which the element is behind the front.
@@ -54,6 +58,9 @@ pub struct HeightField {
     /// that a fit takes no longer than without them.
     #[serde(default)]
     pub(super) patches: Observations,
+    /// Whether contacts have errors in common whose size is learned.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) has_postures: bool,
     /// Contacts to which views are registered.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) touched: Vec<Contact>,
@@ -101,6 +108,7 @@ impl HeightField {
             zone,
             settings,
             patches: contacts.clone(),
+            has_postures: false,
             seen: Vec::new(),
             touched: Vec::new(),
             contacts,
@@ -235,7 +243,7 @@ impl HeightField {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
                 Posterior::new(self.kernels.kernel(), hyperparameters, self.observations())?;
-            posterior.inflate(sd_inflation(&posterior.loo_z_scores()));
+            posterior.inflate(band_factor(&posterior.loo_z_scores()));
             // Conditioned again below, so that the recorded numbers are reproduced to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
@@ -337,6 +345,7 @@ impl HeightField {
                 (posterior, Some(left_sd))
             }
         };
+        posterior.inflate(self.settings.sd_inflation);
         if let Some(ceiling) = &self.ceiling {
             ceiling.truncate(&mut posterior, &self.presence.silhouette());
         }
@@ -412,6 +421,11 @@ impl HeightField {
                 (None, None) => TouchNoise::Fitted,
             },
             start_sd: None,
+            common_ratio: self.has_postures.then(|| Range {
+                low: COMMON_RANGE[0],
+                high: COMMON_RANGE[1],
+                prior: Some(COMMON_ERROR_M.scaled(1.0 / scale)),
+            }),
         }
     }
 
@@ -470,16 +484,4 @@ fn mean_with_gradient(
     let mut slopes = [0.0; 2];
     let height_m = posterior.mean_gradient(place, &mut slopes[..place.len()], scratch);
     (height_m, zone.x_wz().rotation * Vector3::new(-slopes[0], 1.0, -slopes[1]))
-}
-
-/// Returns the calibration factor of the 95 % band: the smallest that covers (n + 1)·95 % of the n
-/// leave-one-out z-scores `z`, or all of them if that exceeds n, in units of 1.96. It is at least
-/// 1, since a few contacts do not show the largest deviations.
-fn sd_inflation(z: &[f64]) -> f64 {
-    let mut far: Vec<f64> = z.iter().map(|z| z.abs()).collect();
-    far.sort_by(f64::total_cmp);
-    let held = (0.95 * (far.len() + 1) as f64).ceil() as usize;
-    let last = far.get(held.saturating_sub(1)).or(far.last());
-    let factor = last.map_or(1.0, |z| z / BAND_95);
-    if factor.is_finite() { factor.max(1.0) } else { 1.0 }
 }

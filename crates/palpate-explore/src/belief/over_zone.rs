@@ -70,7 +70,7 @@ impl SurfaceBelief for HeightField {
     fn predict(&self, target: &Target) -> Option<Deviation> {
         let (surface, place) = (self.surface()?, target.place()?);
         let mut scratch = Scratch::default();
-        let noise_sd = surface.hyperparameters().noise_sd;
+        let noise_sd = surface.hyperparameters().touch_sd();
         let variance = surface.variance(place, &mut scratch) + noise_sd * noise_sd;
         let mean_m = surface.mean(place, &mut scratch);
         Some(Deviation { mean_m, sd_m: variance.max(0.0).sqrt() })

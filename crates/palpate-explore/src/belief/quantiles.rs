@@ -38,7 +38,7 @@ impl HeightField {
         probabilities: &[f64],
     ) -> Option<Vec<Vec<f64>>> {
         let Some(band) = self.settings.band.learned() else {
-            let noise2 = self.surface.as_ref()?.hyperparameters().noise_sd.powi(2);
+            let noise2 = self.surface.as_ref()?.hyperparameters().touch_sd().powi(2);
             let z: Vec<f64> = probabilities.iter().map(|p| normal::quantile(*p)).collect();
             let row = predictions.iter().map(|at| {
                 let sd_m = (at.variance + noise2).max(0.0).sqrt();
@@ -62,7 +62,7 @@ impl HeightField {
     ) -> Option<Vec<BandFeatures>> {
         let surface = self.surface.as_ref()?;
         let hyperparameters = surface.hyperparameters();
-        let noise2 = hyperparameters.noise_sd.powi(2);
+        let noise2 = hyperparameters.touch_sd().powi(2);
         let heights_m = self.contacts.heights();
         let contacts_m = heights_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |ends, at| {
             [ends[0].min(*at), ends[1].max(*at)]
@@ -90,7 +90,7 @@ impl HeightField {
     /// Returns the largest possible height at each of `places`, m above the datum: below the space
     /// swept by touches with contact, with the noise of a touch, and the nearest depth of the zone.
     fn upper_bounds_m(&self, places: &[impl AsRef<[f64]>]) -> Vec<f64> {
-        let noise_sd = self.surface.as_ref().map_or(0.0, |it| it.hyperparameters().noise_sd);
+        let noise_sd = self.surface.as_ref().map_or(0.0, |it| it.hyperparameters().touch_sd());
         let margin_m = normal::BAND_95 * noise_sd;
         let mut bounds_m = vec![self.depth_limits_m()[1]; places.len()];
         for swept in self.swept.iter().filter(|swept| swept.end != End::Miss) {

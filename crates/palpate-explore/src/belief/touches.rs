@@ -68,28 +68,37 @@ impl HeightField {
         }
     }
 
-    /// Adds points of the surface. Of points with a common error, some are dense enough, and some
-    /// of these take part in fits; of others, the first one does.
+    /// Adds points of the surface. Of a stroke, some are dense enough, and some of these take part in
+    /// fits; of one posture all do, of others the first one.
     fn add_points(&mut self, points: &SurfacePoints) {
-        let number = FIRST_SOURCE + self.touched.len();
-        let (thinned, fitted, source) = match points.source {
-            Some(_) => (points.thinned(self.stroke_step_m()), STROKE_FITTED, Some(number)),
-            None => (points.clone(), usize::MAX, None),
+        let source = points.source.map(|_| FIRST_SOURCE + self.touched.len());
+        let (thinned, fitted) = match points.source {
+            Some(ErrorSource::Stroke) => (points.thinned(self.stroke_step_m()), STROKE_FITTED),
+            Some(ErrorSource::Posture) => (points.clone(), 1),
+            None => (points.clone(), usize::MAX),
         };
+        let is_posture = points.source == Some(ErrorSource::Posture);
+        self.has_postures |= is_posture;
         let Some(first) = thinned.points.first() else { return };
         let own_place = self.zone.place(&first.p_wc);
         let target = self.targets.last().unwrap_or(&own_place);
         self.presence.add_contact(target, first, thinned.points.len() > 1);
+        if is_posture {
+            for point in &thinned.points[1..] {
+                self.presence.add_contact(&self.zone.place(&point.p_wc), point, false);
+            }
+        }
         self.touched.push(first.clone());
         for (i, point) in thinned.points.iter().enumerate() {
             let slope = self.slope(&point.normal_w).filter(|_| point.has_normal);
             let slope = slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
             let place = self.zone.place(&point.p_wc);
             let (height, stated) = (self.zone.height_m(&point.p_wc), self.noise(point));
-            let common = [stated * self.noise_unit_m()];
+            // All heights of a posture are off alike.
+            let common = [if is_posture { 1.0 } else { stated * self.noise_unit_m() }];
             let known =
                 source.map(|source| KnownError { variance: 0.0, source, loadings: &common });
-            let noise = if source.is_some() { 1.0 } else { stated };
+            let noise = if source.is_some() && !is_posture { 1.0 } else { stated };
             let to = if i % fitted == 0 { &mut self.contacts } else { &mut self.patches };
             to.push(&Observation { place: &place, height, noise, slope, known });
         }

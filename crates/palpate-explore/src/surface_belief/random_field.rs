@@ -75,7 +75,7 @@ impl RandomField for Posterior {
     }
 
     fn noise_sd(&self) -> f64 {
-        self.hyperparameters().noise_sd
+        self.hyperparameters().touch_sd()
     }
 
     fn reduction(&self, references: &[Vec<f64>], weights: Vec<f64>) -> Box<dyn Reduction + '_> {

@@ -93,10 +93,10 @@ impl SurfaceBelief for ImplicitSurface {
     fn distance_m(&self, p_w: &Point3<f64>) -> Option<Deviation> {
         let surface = self.surface()?;
         let sd = surface.sds_m(&[*p_w]).first().copied()?;
-        let noise_sd = surface.posterior().hyperparameters().noise_sd;
         let field = surface.field(p_w);
         let per_m = steepness(&field.gradient);
-        Some(Deviation { mean_m: field.value / per_m, sd_m: sd.hypot(noise_sd) / per_m })
+        let sd_m = sd.hypot(surface.noise_sd()) / per_m;
+        Some(Deviation { mean_m: field.value / per_m, sd_m })
     }
 
     fn predict(&self, target: &Target) -> Option<Deviation> {
@@ -191,7 +191,7 @@ impl RandomField for Surface {
     }
 
     fn noise_sd(&self) -> f64 {
-        self.posterior().hyperparameters().noise_sd
+        self.posterior().hyperparameters().touch_sd()
     }
 
     fn reduction(&self, references: &[Vec<f64>], weights: Vec<f64>) -> Box<dyn Reduction + '_> {

@@ -2,7 +2,7 @@
 //! gradient, and positive in swept free space. Also the prior mean: a body around the contacts.
 
 use super::settings::PriorShape;
-use crate::evidence::{Contact, End, Evidence, FreeVolume, SurfacePoints};
+use crate::evidence::{Contact, End, ErrorSource, Evidence, FreeVolume, SurfacePoints};
 use crate::task::stroke::FIRST_SOURCE;
 use crate::task::{Aim, Ball};
 use crate::view::SeenSurface;
@@ -53,6 +53,17 @@ impl FreeVolume {
     }
 }
 
+/// What is known of the errors that observations have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum CommonError {
+    /// There are none.
+    None,
+    /// Their size.
+    Stated,
+    /// Which observations have one: its size is fitted.
+    Learned,
+}
+
 /// Assumption about the cameras' poses that registration has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CameraPose {
@@ -83,26 +94,33 @@ pub(super) struct ObservationModel<'a> {
 const SURE: f64 = 0.1;
 
 impl SpatialEvidence {
-    /// Adds evidence; of points with a common error those that are `apart_m`.
+    /// Adds evidence; of a stroke the points that are `apart_m`.
     pub fn add(&mut self, evidence: &Evidence, apart_m: f64) {
         match evidence {
             Evidence::Points(points) => self.points.push(match points.source {
-                Some(_) => points.thinned(apart_m),
-                None => points.clone(),
+                Some(ErrorSource::Stroke) => points.thinned(apart_m),
+                Some(ErrorSource::Posture) | None => points.clone(),
             }),
             Evidence::Free(free) => self.free.push(free.clone()),
             Evidence::Seen(seen) => self.seen.push((**seen).clone()),
         }
     }
 
-    /// Whether there are errors of known size: those of views, and of points with a common error
-    /// whose sensor states it.
-    pub(super) fn has_known_errors(&self) -> bool {
-        let mut common = self.points.iter().filter(|points| points.source.is_some());
+    /// Returns what is known of errors in common: their size, where there are views or strokes whose
+    /// sensor states it.
+    pub(super) fn common_error(&self) -> CommonError {
         let states = |points: &SurfacePoints| {
             points.points.iter().any(|contact| contact.covariance_w.is_some())
         };
-        !self.seen.is_empty() || common.any(states)
+        let mut strokes =
+            self.points.iter().filter(|points| points.source == Some(ErrorSource::Stroke));
+        let mut postures =
+            self.points.iter().filter(|points| points.source == Some(ErrorSource::Posture));
+        match () {
+            () if !self.seen.is_empty() || strokes.any(states) => CommonError::Stated,
+            () if postures.any(|points| points.points.len() > 1) => CommonError::Learned,
+            () => CommonError::None,
+        }
     }
 
     /// Points of contact with their normals, in order.
@@ -128,8 +146,8 @@ impl SpatialEvidence {
     }
 
     /// Returns the observations of the field relative to the prior mean. At each contact the field
-    /// is 0, with the normal as its gradient if normals are observed; points with a common error
-    /// have it in the size that each states. At the centre of each swept ball inside the model's
+    /// is 0, with the normal as its gradient if normals are observed; points of a stroke have an
+    /// error in common in the size that each states, those of a posture are off by one vector. At the centre of each swept ball inside the model's
     /// ball it is the distance to the nearest contact. That is the upper bound of a distance there,
     /// and the swept radius the lower bound: the standard deviation is that of a uniform
     /// distribution between them.
@@ -137,8 +155,10 @@ impl SpatialEvidence {
         let ObservationModel { prior, ball, noise_m, normals, free_space_samples, .. } = *model;
         let mut all = Observations::new(3);
         let mut source = FIRST_SOURCE;
+        let learned = self.common_error() == CommonError::Learned;
         for points in &self.points {
-            let is_common = points.source.is_some();
+            let is_stroke = points.source == Some(ErrorSource::Stroke);
+            let is_posture = learned && points.source == Some(ErrorSource::Posture);
             for contact in &points.points {
                 let Contact { p_wc: p_w, normal_w, has_normal, .. } = contact;
                 let sd_m = contact.sd_m();
@@ -148,16 +168,17 @@ impl SpatialEvidence {
                     .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
                 let place = p_w.coords.as_slice();
                 let common = [sd_m.unwrap_or(0.0)];
-                let known = (is_common && sd_m.is_some()).then_some(KnownError {
-                    variance: 0.0,
-                    source,
-                    loadings: &common,
-                });
-                let noise = sd_m.filter(|_| !is_common);
+                let moved = if *has_normal { *normal_w } else { field.gradient };
+                let loadings = match is_posture {
+                    true => Some(moved.as_slice()),
+                    false => (is_stroke && sd_m.is_some()).then_some(&common[..]),
+                };
+                let known = loadings.map(|loadings| KnownError { variance: 0.0, source, loadings });
+                let noise = sd_m.filter(|_| !is_stroke);
                 let noise = noise.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
                 all.push(&Observation { place, height: -field.value, noise, slope, known });
             }
-            source += usize::from(is_common);
+            source += usize::from(points.source.is_some());
         }
         for number in 0..self.seen.len() {
             self.push_seen(model, number, &mut all);
@@ -230,6 +251,8 @@ const BEFORE: f64 = 0.1;
 pub struct PriorMean {
     /// Centre in `W` and half axes along those of `W`; `None` for a field of zeros.
     body: Option<(Point3<f64>, Vector3<f64>)>,
+    /// Whether the field is a distance to first order.
+    is_distance: bool,
 }
 
 /// Shortest half axis as a fraction of the ball's radius, so that contacts in one plane still span
@@ -260,25 +283,38 @@ impl PriorMean {
         let unknown = || (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m));
         let (centre_w, radii_m) = half_axes_m(ball, points).unwrap_or_else(unknown);
         let body = match shape {
-            PriorShape::Ellipsoid => Some((centre_w, radii_m)),
+            PriorShape::Ellipsoid | PriorShape::Distance => Some((centre_w, radii_m)),
             PriorShape::Sphere => Some((centre_w, Vector3::repeat(radii_m.product().cbrt()))),
             PriorShape::None => None,
         };
-        Self { body }
+        Self { body, is_distance: shape == PriorShape::Distance }
     }
 
-    /// Returns the field at `p_w`, negative inside, with its gradient: s·(|v / r|² − 1) / 2 for the
-    /// offset v from the centre, the half axes r and the smallest of them s. It is infinitely
+    /// Returns the field at `p_w`, negative inside, with its gradient: h = s·(|v / r|² − 1) / 2 for
+    /// the offset v from the centre, the half axes r and the smallest of them s. It is infinitely
     /// smooth, so that the residual of the Gaussian process is no rougher than the object.
+    ///
+    /// The distance to first order is h / √(|∇h|² + m²) (Taubin 1991), with m = 2 min(h, 0) / s so
+    /// that it is −s / 2 at the centre, where ∇h is 0.
     pub fn field(&self, p_w: &Point3<f64>) -> Field {
         let Some((centre_w, radii_m)) = &self.body else {
             return Field { value: 0.0, gradient: Vector3::zeros() };
         };
         let scaled = (p_w - centre_w).component_div(radii_m);
         let least_m = radii_m.min();
+        let value = 0.5 * least_m * (scaled.norm_squared() - 1.0);
+        let gradient = scaled.component_div(radii_m) * least_m;
+        if !self.is_distance {
+            return Field { value, gradient };
+        }
+        let inside = 2.0 * value.min(0.0) / least_m;
+        let steepness = gradient.norm().hypot(inside);
+        // The second derivative of h is diagonal: s / r².
+        let by_gradient = gradient.component_div(radii_m).component_div(radii_m) * least_m;
+        let slope = (by_gradient + gradient * (2.0 * inside / least_m)) / steepness;
         Field {
-            value: 0.5 * least_m * (scaled.norm_squared() - 1.0),
-            gradient: scaled.component_div(radii_m) * least_m,
+            value: value / steepness,
+            gradient: gradient / steepness - slope * (value / (steepness * steepness)),
         }
     }
 }

@@ -1,11 +1,14 @@
 //! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
 //! inside (Williams & Fitzgibbon 2007).
 
-use super::evidence::{CameraPose, ObservationModel, PriorMean, SpatialEvidence, half_axes_m};
+use super::evidence::{
+    CameraPose, CommonError, ObservationModel, PriorMean, SpatialEvidence, half_axes_m,
+};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::evidence::{End, Evidence, Outcome};
+use crate::gp_settings::COMMON_ERROR_M;
 use crate::task::{Aim, Ball, Target};
 use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -48,6 +51,10 @@ fn default_kernel() -> &'static dyn Kernel {
 /// and the object fills a part of the ball.
 const SIGNAL: f64 = 0.5;
 const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];
+
+/// Bounds of an error in common of unknown size, as fractions of the signal's standard deviation.
+// heuristic: from a ten-thousandth, which no contact shows, to as much as the object.
+const COMMON_RANGE: [f64; 2] = [1e-4, 1.0];
 
 /// Computational budget of a fit in cubed matrix sizes, with at least [`TRIED_MIN`] factorisations;
 /// a heuristic: some ten milliseconds.
@@ -328,8 +335,12 @@ impl ImplicitSurface {
         ranges.extend(self.normals().then_some(*slope_noise));
         // Errors of known size do not grow with the signal, which is then searched too.
         let signals_m = SIGNAL_RANGE.map(|share| share * radius_m);
-        let is_known = self.evidence.has_known_errors();
-        ranges.extend(is_known.then_some(signals_m));
+        let common = self.evidence.common_error();
+        ranges.extend(match common {
+            CommonError::None => None,
+            CommonError::Stated => Some(signals_m),
+            CommonError::Learned => Some(COMMON_RANGE),
+        });
         let logs = ranges.iter().map(|range| range.map(f64::ln));
         let ranges: Vec<[f64; 2]> = std::iter::once(EXPONENT).chain(logs).collect();
         let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
@@ -343,7 +354,11 @@ impl ImplicitSurface {
                 let exponent = logs.dot(&extents) / extents.norm_squared().max(f64::MIN_POSITIVE);
                 let mut begin = vec![exponent, length_m.ln(), ratio.height.ln()];
                 begin.extend(self.normals().then(|| (ratio.slope * length_m).ln()));
-                begin.extend(is_known.then(|| start.signal_sd.ln()));
+                begin.extend(match common {
+                    CommonError::None => None,
+                    CommonError::Stated => Some(start.signal_sd.ln()),
+                    CommonError::Learned => Some(ratio.known.ln()),
+                });
                 begin
             }
             None => {
@@ -352,11 +367,15 @@ impl ImplicitSurface {
         };
         // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
-        let signal_sd = match is_known {
-            true => SignalModel::Searched,
-            false => SignalModel::Profiled(Range::from((signals_m[0], signals_m[1]))),
+        let signal_sd = match common {
+            CommonError::Stated => SignalModel::Searched,
+            CommonError::None | CommonError::Learned => {
+                let prior = self.settings.priors.signal.map(|prior| prior.scaled(radius_m));
+                SignalModel::Profiled(Range { low: signals_m[0], high: signals_m[1], prior })
+            }
         };
-        let parameters = |logs: &[f64]| parameters(logs, is_known);
+        let parameters = |logs: &[f64]| parameters(logs, common);
+        let is_learned = common == CommonError::Learned;
         let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
         let cube = (observations.order() as f64).powi(3);
         // Each fit starts with a different parameter, so that short fits cover all of them.
@@ -367,13 +386,23 @@ impl ImplicitSurface {
             let (exponent, length_m, ratio) = parameters(logs);
             let lengths_m = lengths_m(exponent, length_m);
             let found = likelihood.profile(&lengths_m, ratio, &signal_sd, None)?;
-            Ok::<_, CovarianceError>((found.log_likelihood, found.signal_sd))
+            let priors = [
+                (self.settings.priors.length_scale, length_m / radius_m),
+                (self.settings.priors.noise, ratio.height),
+                (is_learned.then_some(COMMON_ERROR_M), ratio.known * found.signal_sd),
+            ];
+            let prior =
+                priors.iter().filter_map(|(prior, at)| Some((*prior)?.log_density(at.ln())));
+            let value = prior.fold(found.log_likelihood, |sum, log| sum + log);
+            Ok::<_, CovarianceError>((value, found.signal_sd))
         })?;
         let (exponent, length_m, ratio) = parameters(&found.x);
         let lengths_m = lengths_m(exponent, length_m).to_vec();
+        let common_sd = is_learned.then_some(ratio.known * signal_sd);
+        let at = Hyperparameters::new(signal_sd, lengths_m, ratio, 0.0);
         Ok(Fit {
             kernel: None,
-            hyperparameters: Hyperparameters::new(signal_sd, lengths_m, ratio, 0.0),
+            hyperparameters: Hyperparameters { common_sd, ..at },
             log_likelihood: found.value,
             nystrom_residual_sd: None,
             factorisations: found.evaluations,
@@ -442,14 +471,15 @@ fn is_kept(last: &Fit, observations: &Observations) -> bool {
 
 /// Returns the exponent of the extents, the geometric mean of the length scales, m, and the noise
 /// ratios, from the exponent and the logarithms of the others; the slopes' noise is per length
-/// scale. With errors of known size, the last is that of the signal.
-fn parameters(logs: &[f64], is_known: bool) -> (f64, f64, NoiseRatio) {
-    let (signal, logs) = match logs.split_last() {
-        Some((signal, logs)) if is_known => (Some(signal), logs),
-        _ => (None, logs),
+/// scale. With errors in common of known size, the last is that of the signal; of unknown size, it
+/// is their ratio to the signal.
+fn parameters(logs: &[f64], common: CommonError) -> (f64, f64, NoiseRatio) {
+    let (known, logs) = match (common, logs.split_last()) {
+        (CommonError::Stated, Some((signal, logs))) => ((-signal).exp(), logs),
+        (CommonError::Learned, Some((ratio, logs))) => (ratio.exp(), logs),
+        _ => (0.0, logs),
     };
     let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());
-    let known = signal.map_or(0.0, |log| (-log).exp());
     let exponent = logs.first().copied().unwrap_or(0.0);
     (exponent, at(1), NoiseRatio { height: at(2), slope: at(3) / at(1), known })
 }
