@@ -2,11 +2,11 @@
 
 use super::library::{Library, LibraryObject};
 use super::measurement::{
-    Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull,
+    Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull, log_sum_exp,
 };
 use super::model::Model;
 use super::object_posterior::{HOPELESS, ObjectPosterior, Search};
-use super::particles::{Particles, log_sum_exp, systematic};
+use super::particles::{Particles, systematic};
 use super::pose_prior::PosePrior;
 use crate::evidence::Outcome;
 use crate::robot::sensor::{GelPad, TipSurface};
@@ -121,11 +121,6 @@ pub struct PoseEstimate {
     /// Distance of the surfaces, m, that the pose exceeds with a probability of 5 %.
     pub distance_95_m: f64,
 }
-
-/// Number of poses among which an estimate is found, and the step between the points of its
-/// distances; heuristics.
-const ESTIMATED: usize = 24;
-const POINT_STEP: usize = 8;
 
 /// Smallest number of poses per object.
 const FEWEST: u32 = 8;
@@ -358,8 +353,8 @@ impl ObjectHypotheses {
     /// Deviation of the surface of a shape near to one of the library, at a point in `W`, m: it
     /// grows with the distance from the contacts so far.
     pub fn near_sd_m(&self, p_w: &Point3<f64>) -> f64 {
-        let contacts = self.evidence.iter().filter_map(|measurement| measurement.contact_w());
-        let nearest_m = contacts.map(|at_w| (at_w - p_w).norm()).fold(f64::INFINITY, f64::min);
+        let contacts = self.evidence.iter().flat_map(|measurement| measurement.touched_w());
+        let nearest_m = contacts.map(|(at_w, _)| (at_w - p_w).norm()).fold(f64::INFINITY, f64::min);
         // What a squared exponential kernel leaves of the prior's variance.
         let left = -(-(nearest_m / ALIKE_M).powi(2)).exp_m1();
         NEAR_SHAPE.contact_sd_m * left.sqrt()
@@ -429,27 +424,8 @@ impl ObjectHypotheses {
             .max_by(|a, b| a.1.particles.log_evidence.total_cmp(&b.1.particles.log_evidence));
         let (number, posterior) = likely.unwrap_or((0, &self.objects[0]));
         let object = &self.library.objects()[number];
-        let weighted: Vec<_> = posterior.particles.weighted().collect();
-        let drawn = systematic(weighted.iter().map(|it| it.1), ESTIMATED, 0.5);
-        let poses: Vec<&Isometry3<f64>> = drawn.into_iter().map(|i| weighted[i].0).collect();
-        let distance_m = |from, to| object.sampled_distance_m(to, from, POINT_STEP);
-        let sum_m = |from| poses.iter().map(|to| distance_m(from, to)).sum::<f64>();
-        let scored = poses.iter().map(|pose| (sum_m(*pose), **pose));
-        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
-        let x_wo = best.map_or_else(Isometry3::identity, |(_, pose)| pose);
-        // Over all particles, because the quantile is in the tail.
-        let step = (weighted.len() / 128).max(1);
-        let mut away: Vec<(f64, f64)> = (weighted.iter().step_by(step))
-            .map(|(pose, weight)| (distance_m(&x_wo, *pose), *weight))
-            .collect();
-        away.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let whole: f64 = away.iter().map(|it| it.1).sum();
-        let mut passed = 0.0;
-        let within = away.iter().find(|(_, weight)| {
-            passed += weight;
-            passed >= 0.95 * whole
-        });
-        let distance_95_m = within.map_or(0.0, |it| it.0).hypot(self.offset_m);
+        let (x_wo, distance_95_m) = posterior.particles.central(object);
+        let distance_95_m = distance_95_m.hypot(self.offset_m);
         PoseEstimate { object: number, x_wo, distance_95_m }
     }
 

@@ -15,7 +15,10 @@ mod pairs;
 mod particles;
 mod peaks;
 mod pose_prior;
+mod recorded;
 
 pub use hypotheses::{Hypothesis, ObjectHypotheses, PoseEstimate, Prediction, RecognitionSettings};
 pub use library::{Library, LibraryObject};
+pub use measurement::ContactErrors;
 pub use pose_prior::{PosePrior, Turn};
+pub use recorded::{RecordedObject, recognise};

@@ -1,9 +1,10 @@
 //! Posterior of one object's pose beside those of the other objects: it is left out, and found
 //! again.
 
+use super::measurement::log_sum_exp;
 use super::model::Model;
 use super::pairs;
-use super::particles::{Particles, log_sum_exp};
+use super::particles::Particles;
 use super::peaks;
 use nalgebra::Isometry3;
 use rand::Rng;

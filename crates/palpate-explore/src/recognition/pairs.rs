@@ -20,7 +20,7 @@ pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 /// Returns up to `count` poses at which two contacts lie on the object of `model`; none before two
 /// contacts with normals.
 pub(super) fn poses(model: &Model, count: usize, random: &mut impl Rng) -> Vec<Isometry3<f64>> {
-    let touched = model.evidence.iter().filter_map(|it| it.touched_w());
+    let touched = model.evidence.iter().flat_map(|it| it.touched_w());
     let contacts: Vec<Oriented> =
         touched.filter_map(|(p_w, normal_w)| Some((p_w, normal_w?))).collect();
     if contacts.len() < 2 {
@@ -92,8 +92,8 @@ mod tests {
         let model = Model { object: &object, prior: &prior, evidence: &touches, noise: NOISE };
         let mut random = seed::stream(3, 0, "pairs");
         let apart_m = |x_wo: &Isometry3<f64>| {
-            let contacts = touches.iter().filter_map(|touch| touch.contact_w());
-            contacts.map(|p_w| object.nearest(x_wo, &p_w).distance_m.abs()).fold(0.0, f64::max)
+            let contacts = touches.iter().flat_map(|touch| touch.touched_w());
+            contacts.map(|(p_w, _)| object.nearest(x_wo, &p_w).distance_m.abs()).fold(0.0, f64::max)
         };
         let found = poses(&model, 64, &mut random);
         let nearest_m = found.iter().map(apart_m).fold(f64::INFINITY, f64::min);

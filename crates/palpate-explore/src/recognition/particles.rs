@@ -2,7 +2,8 @@
 //! at a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
 //! Calderhead 2011) on all evidence so far.
 
-use super::measurement::{LogLikelihood, MeasurementFit};
+use super::library::LibraryObject;
+use super::measurement::{LogLikelihood, MeasurementFit, log_sum_exp};
 use super::model::{Model, Quadratic};
 use super::pose_prior::moved;
 use nalgebra::{Isometry3, Vector6};
@@ -31,6 +32,11 @@ const STEP: f64 = 1.0;
 /// Number of shorter moves, each half as long as the one before, while most particles are copies.
 // heuristic: a rough posterior accepts few full steps.
 const SHORTER: i32 = 4;
+
+/// Number of poses among which an estimate is found, and the step between the points of its
+/// distances; heuristics.
+const ESTIMATED: usize = 24;
+const POINT_STEP: usize = 8;
 
 /// A pose with its residuals.
 #[derive(Clone)]
@@ -98,6 +104,32 @@ impl Particles {
     pub fn weighted(&self) -> impl Iterator<Item = (&Isometry3<f64>, f64)> {
         let weights = self.log_weights.iter().map(|log| log.exp());
         self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
+    }
+
+    /// Returns the pose of `object` with the smallest expected distance of surfaces, and the distance
+    /// that it exceeds with a probability of 5 %, m.
+    pub fn central(&self, object: &LibraryObject) -> (Isometry3<f64>, f64) {
+        let weighted: Vec<_> = self.weighted().collect();
+        let drawn = systematic(weighted.iter().map(|it| it.1), ESTIMATED, 0.5);
+        let poses: Vec<&Isometry3<f64>> = drawn.into_iter().map(|i| weighted[i].0).collect();
+        let distance_m = |from, to| object.sampled_distance_m(to, from, POINT_STEP);
+        let sum_m = |from| poses.iter().map(|to| distance_m(from, to)).sum::<f64>();
+        let scored = poses.iter().map(|pose| (sum_m(*pose), **pose));
+        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
+        let x_wo = best.map_or_else(Isometry3::identity, |(_, pose)| pose);
+        // Over all particles, because the quantile is in the tail.
+        let step = (weighted.len() / 128).max(1);
+        let mut away: Vec<(f64, f64)> = (weighted.iter().step_by(step))
+            .map(|(pose, weight)| (distance_m(&x_wo, *pose), *weight))
+            .collect();
+        away.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let whole: f64 = away.iter().map(|it| it.1).sum();
+        let mut passed = 0.0;
+        let within = away.iter().find(|(_, weight)| {
+            passed += weight;
+            passed >= 0.95 * whole
+        });
+        (x_wo, within.map_or(0.0, |it| it.0))
     }
 
     /// Takes in those of the model's evidence that is new; `wanted` poses remain after resampling.
@@ -270,15 +302,6 @@ pub(super) fn systematic(
     // Rounding of the sum.
     drawn.resize(count, last);
     drawn
-}
-
-/// Returns the logarithm of a sum of exponentials; −∞ for an empty one.
-pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    match most.is_finite() {
-        true => most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln(),
-        false => most,
-    }
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@
 //! 1995).
 
 use super::library::Nearest;
-use super::measurement::LEVER_M;
+use super::measurement::{LEVER_M, log_sum_exp};
 use super::model::{Model, Quadratic};
-use super::particles::{Particle, Particles, free_normals, log_sum_exp, systematic};
+use super::particles::{Particle, Particles, free_normals, systematic};
 use super::pose_prior::{PosePrior, motion, moved};
 use nalgebra::{Isometry3, Vector6};
 use rand::{Rng, RngExt};
@@ -85,7 +85,7 @@ pub(super) fn find(model: &Model, starts: impl Iterator<Item = Isometry3<f64>>) 
 
 /// Returns those starts at which the contacts lie best on the object; all before a contact.
 fn promising(model: &Model, starts: Vec<Isometry3<f64>>) -> Vec<Isometry3<f64>> {
-    let contacts: Vec<_> = model.evidence.iter().filter_map(|it| it.touched_w()).collect();
+    let contacts: Vec<_> = model.evidence.iter().flat_map(|it| it.touched_w()).collect();
     if contacts.is_empty() {
         return starts;
     }

@@ -16,6 +16,15 @@ pub fn inflation(count: usize) -> f64 {
     (count as f64 / INDEPENDENT).max(1.0).sqrt()
 }
 
+/// Returns the logarithm of a sum of exponentials; −∞ for an empty one.
+pub fn log_sum_exp(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match most.is_finite() {
+        true => most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln(),
+        false => most,
+    }
+}
+
 /// Noise of the contacts of an object at its true pose.
 #[derive(Clone, Copy, Debug)]
 pub struct NoiseModel {
@@ -81,6 +90,22 @@ impl LogLikelihood {
         self.value += ratio.ln();
         self.gradient -= terms.gradient * share;
         self.information += terms.information * share;
+    }
+
+    /// Adds `weight` times the log-likelihood ratio of a normal that is turned by the rotation
+    /// vector `turn` from the object's, over one that is uniform over a hemisphere.
+    pub fn add_turn(
+        &mut self,
+        turn: &Vector3<f64>,
+        normal_w: &Vector3<f64>,
+        sd_rad: f64,
+        weight: f64,
+    ) {
+        let mut terms = Terms::default();
+        terms.add_turn(turn, normal_w, sd_rad);
+        self.value -= weight * (terms.half_squares + 2.0 * sd_rad.ln());
+        self.gradient -= terms.gradient * weight;
+        self.information += terms.information * weight;
     }
 }
 

@@ -1,20 +1,26 @@
 //! Measurement of touches and views for an object at a pose.
 
+mod contacts;
 mod likelihood;
 mod touch;
 mod view;
 
-pub use likelihood::{LogLikelihood, NoiseModel};
+pub use contacts::{ContactErrors, ContactSet};
+pub use likelihood::{LogLikelihood, NoiseModel, log_sum_exp};
 pub use touch::{LEVER_M, TouchMeasurement, before_m, hull};
 pub use view::ViewMeasurement;
 
 use super::library::LibraryObject;
+use contacts::RecordedFit;
 use likelihood::Residual;
 use nalgebra::{Isometry3, Point3, Vector3};
+use std::sync::Arc;
 use touch::TouchFit;
 
-/// Measurement of one touch or view.
+/// Measurement of one touch or view, or of recorded contacts.
 pub enum Measurement {
+    /// Recorded contacts.
+    Contacts(Arc<ContactSet>),
     /// Contact or miss with the space that the finger swept.
     Touch(TouchMeasurement),
     /// Points that a camera has seen.
@@ -24,6 +30,8 @@ pub enum Measurement {
 /// Residuals of evidence for an object at a pose.
 #[derive(Clone, Debug)]
 pub enum MeasurementFit {
+    /// Those of recorded contacts.
+    Contacts(Vec<RecordedFit>),
     /// Those of a touch.
     Touch(TouchFit),
     /// Distances of the points of a view.
@@ -31,22 +39,21 @@ pub enum MeasurementFit {
 }
 
 impl Measurement {
-    /// Returns the point that a touch has met, in `W`.
-    pub fn contact_w(&self) -> Option<Point3<f64>> {
-        Some(self.touched_w()?.0)
-    }
-
-    /// Returns the point that a touch has met, in `W`, and its normal, if its sensor has one.
-    pub fn touched_w(&self) -> Option<(Point3<f64>, Option<Vector3<f64>>)> {
-        match self {
-            Self::Touch(touch) => touch.touched_w(),
-            Self::View(_) => None,
-        }
+    /// Returns the points of contact, in `W`, each with its normal, if its sensor has one; of a touch
+    /// the first.
+    pub fn touched_w(&self) -> impl Iterator<Item = (Point3<f64>, Option<Vector3<f64>>)> {
+        let (contacts, touch) = match self {
+            Self::Contacts(contacts) => (Some(contacts.touched_w()), None),
+            Self::Touch(touch) => (None, touch.touched_w()),
+            Self::View(_) => (None, None),
+        };
+        contacts.into_iter().flatten().chain(touch)
     }
 
     /// Returns the residuals for `object` at the pose `x_wo`.
     pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> MeasurementFit {
         match self {
+            Self::Contacts(contacts) => MeasurementFit::Contacts(contacts.fit(object, x_wo)),
             Self::Touch(touch) => MeasurementFit::Touch(touch.fit(object, x_wo)),
             Self::View(view) => MeasurementFit::View(view.fit(object, x_wo)),
         }
@@ -61,12 +68,12 @@ impl Measurement {
         to: &mut LogLikelihood,
     ) {
         match (self, fit) {
+            (Self::Contacts(contacts), MeasurementFit::Contacts(fit)) => {
+                contacts.add(fit, noise, tau_m, to);
+            }
             (Self::Touch(touch), MeasurementFit::Touch(fit)) => touch.add(fit, noise, tau_m, to),
             (Self::View(view), MeasurementFit::View(fit)) => view.add(fit, noise, tau_m, to),
-            (Self::Touch(_), MeasurementFit::View(_))
-            | (Self::View(_), MeasurementFit::Touch(_)) => {
-                debug_assert!(false, "residuals of other evidence");
-            }
+            _ => debug_assert!(false, "residuals of other evidence"),
         }
     }
 }

@@ -185,7 +185,7 @@ pub fn hull(finger: &Finger, r_wt: &UnitQuaternion<f64>, p_wt: Point3<f64>) -> C
 }
 
 /// Returns the rotation vector from one unit vector to another, rad.
-fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
     match UnitQuaternion::rotation_between(from, to) {
         Some(turn) => turn.scaled_axis(),
         // Opposite vectors: about any axis across.
