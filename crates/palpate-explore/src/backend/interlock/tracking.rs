@@ -65,7 +65,8 @@ const BLIND_SHARE: f64 = 1.5;
 struct Standstill {
     stuck_s: f64,
     blind_s: f64,
-    /// Time since which each joint has been commanded without a change of its position.
+    /// Time since which each joint should have changed its position. A last part of a motion that is
+    /// smaller than a step of the readings is not seen either, and a rest may follow it.
     since_s: [Option<f64>; MAX_JOINTS],
 }
 
@@ -73,14 +74,13 @@ impl Interlock for Standstill {
     fn reading(&mut self, now: &RobotState, _: &Reading) -> Result<(), Trip> {
         for (i, joint) in now.chain.joints.iter().enumerate() {
             let unseen_m = now.unconfirmed_motion[i].abs() * now.reaches_m[i];
-            if now.unconfirmed_motion[i] == 0.0 {
+            if unseen_m <= SEEN_M {
                 self.since_s[i] = None;
                 continue;
             }
             let found = now.time_s - *self.since_s[i].get_or_insert(now.time_s - now.period_s);
             let limit = if unseen_m > BLIND_M { self.blind_s } else { self.stuck_s };
-            let moves = unseen_m <= SEEN_M || found <= limit;
-            Trip::check(moves, STUCK_JOINT.name, &joint.name, [found, limit], "s")?;
+            Trip::check(found <= limit, STUCK_JOINT.name, &joint.name, [found, limit], "s")?;
         }
         Ok(())
     }
