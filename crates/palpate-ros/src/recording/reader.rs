@@ -52,6 +52,12 @@ impl RecordedTrial {
     /// # Errors
     /// The errors of [`read`](Self::read).
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self, InputError> {
+        if bytes.starts_with(ROS_1_BAG) {
+            return Err(InputError::new("a ROS 1 bag, not a palpate recording").remedy(
+                "rosbags-convert of the Python package rosbags makes MCAP of it; contacts in it are \
+                 fitted from CSV: `palpate fit --help`",
+            ));
+        }
         let bytes: Arc<[u8]> = bytes.into();
         let (mut about, mut ending) = (None, None);
         let (mut touches, mut made, mut tick_count) = (Vec::new(), 0, 0);
@@ -68,9 +74,15 @@ impl RecordedTrial {
             }
         }
         let about = about.ok_or_else(|| {
-            InputError::new(
-                "not a palpate recording, or truncated at the start: the metadata `palpate` is missing",
-            )
+            let missing = "not a palpate recording, or truncated at the start: the metadata \
+                           `palpate` is missing";
+            let error = InputError::new(missing);
+            match &entries.foreign[..] {
+                [] => error,
+                topics => error
+                    .value(format!("messages {}", topics.join(", ")))
+                    .remedy("contacts in them are fitted from CSV: `palpate fit --help`"),
+            }
         })?;
         Ok(Self { about, touches, earlier_touches: made, tick_count, ending, bytes })
     }
@@ -142,6 +154,12 @@ fn compare(recorded: &[f64], now: &[f64]) -> Result<(), (usize, f64, f64)> {
     Ok(())
 }
 
+/// First bytes of a bag of ROS 1.
+const ROS_1_BAG: &[u8] = b"#ROSBAG V";
+
+/// Number of topics of other programs that a message names.
+const NAMED: usize = 3;
+
 /// Largest size of a record, in bytes; a heuristic: beyond all records written by this program.
 const RECORD_MAX: usize = 64 << 20;
 
@@ -185,6 +203,9 @@ struct Entries {
     reader: LinearReader,
     schemas: HashMap<u16, Decode>,
     channels: HashMap<u16, Decode>,
+    /// Types and topics of messages of other programs, some of them.
+    foreign: Vec<String>,
+    names: HashMap<u16, String>,
     is_over: bool,
 }
 
@@ -194,8 +215,8 @@ impl Entries {
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(RECORD_MAX);
         let reader = LinearReader::new_with_options(options);
-        let (schemas, channels) = (HashMap::new(), HashMap::new());
-        Self { bytes, at: 0, reader, schemas, channels, is_over: false }
+        let (schemas, channels, names) = (HashMap::new(), HashMap::new(), HashMap::new());
+        Self { bytes, at: 0, reader, schemas, channels, foreign: Vec::new(), names, is_over: false }
     }
 
     /// Returns the next entry; `None` at the end, and after an error.
@@ -230,6 +251,17 @@ impl Entries {
                         continue;
                     }
                     let record = mcap::parse_record(opcode, data);
+                    match &record {
+                        Ok(Record::Schema { header, .. }) => {
+                            self.names.insert(header.id, header.name.clone());
+                        }
+                        Ok(Record::Channel(channel)) if self.foreign.len() < NAMED => {
+                            let name = self.names.get(&channel.schema_id);
+                            let name = name.map_or("without a type", String::as_str);
+                            self.foreign.push(format!("{name} on {}", channel.topic));
+                        }
+                        _ => {}
+                    }
                     let (schemas, channels) = (&mut self.schemas, &mut self.channels);
                     if let Some(entry) = entry(record, schemas, channels, self.at)? {
                         return Ok(Some(entry));
