@@ -5,6 +5,7 @@ use super::calibration_text as text;
 use super::find::find_input;
 use super::output::Overwrite;
 use super::terminal::{Completion, Verbosity, print};
+use crate::experiment::wrench_log::{WrenchFrame, read_wrenches};
 use crate::sim::finger::calibration::constants::FingerConstants;
 use crate::sim::finger::calibration::fit::{FreeParameters, fit};
 use crate::sim::finger::calibration::score::leave_one_out;
@@ -16,6 +17,7 @@ use crate::sim::finger::recording::{PlateRecording, Recordings};
 use crate::{files, format};
 use anyhow::{Context, anyhow};
 use clap::ValueEnum;
+use palpate_explore::registration::ToolWeight;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
@@ -33,13 +35,19 @@ Examples:
   palpate calibrate --band experiments/suite/choosing.toml --set touches=60
   palpate calibrate --band my-objects.toml --out bands/mine
   palpate calibrate --band experiments/suite/reporting.toml --test     coverage of the experiment's own band
+  palpate calibrate --weight poses.csv                 weight and bias of a force/torque sensor at rest
 
 With --band, runs trials on objects whose surface is known and fits the two half-widths of the 95 % band by quantile \
 regression. Writes band.toml, the table [gp.band] of an experiment, and reliability.svg. The printed coverage is that \
-of objects left out of the learning.")]
+of objects left out of the learning.
+
+With --weight, fits weight, centre of mass and bias to readings at rest in four or more attitudes. Columns: qx, qy, qz, qw \
+(rotation of the sensor in the robot's base, a unit quaternion), fx, fy, fz (N) and tx, ty, tz (N·m). A touch tares the \
+sensor in its own attitude, so that the weight is in no contact; the arm's controller and the force interlock need it: \
+enter weight and centre as the payload on the robot.")]
 pub struct Args {
     /// Recordings; the format is that of models/biotac/flat_plate.json.
-    #[arg(value_parser = find_input, required_unless_present = "band", conflicts_with_all = ["test", "trials", "set", "threads"])]
+    #[arg(value_parser = find_input, required_unless_present_any = ["band", "weight"], conflicts_with_all = ["test", "trials", "set", "threads"])]
     recordings: Option<PathBuf>,
     /// Test the default constants: fit only the offset, gain and attitude (the finger's orientation
     /// on the plate) of each session.
@@ -56,6 +64,12 @@ pub struct Args {
     /// With --band, folder for the results [default: runs/band-EXPERIMENT].
     #[arg(long, value_name = "FILE|FOLDER", conflicts_with_all = ["attitude_only", "shear"])]
     out: Option<PathBuf>,
+    /// Fit the weight on a force/torque sensor to readings at rest in this file (.csv, .parquet).
+    #[arg(long, value_name = "FILE", value_parser = find_input, conflicts_with_all = ["recordings", "band", "out", "attitude_only", "shear"])]
+    weight: Option<PathBuf>,
+    /// With --weight: the wrenches are in the frame of the robot's base.
+    #[arg(long, requires = "weight")]
+    in_base: bool,
     #[command(flatten)]
     band: BandArgs,
     #[command(flatten)]
@@ -74,6 +88,13 @@ enum Skin {
 pub fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     if let Some(experiment) = &args.band.band {
         return calibrate_band::run(experiment, &args.band, args.out.as_deref(), args.force, talk);
+    }
+    if let Some(path) = &args.weight {
+        let frame = if args.in_base { WrenchFrame::Base } else { WrenchFrame::Sensor };
+        let readings = read_wrenches(path, frame)?;
+        let found = ToolWeight::fit(&readings).map_err(|error| error.at(path.display()))?;
+        print(&text::weight(&found, readings.len()))?;
+        return Ok(Completion::Done);
     }
     let path = args.recordings.as_deref().context("allowed is a file with recordings")?;
     if let Some(out) = &args.out {

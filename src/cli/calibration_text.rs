@@ -5,6 +5,8 @@ use crate::sim::finger::calibration::fit::Fit;
 use crate::sim::finger::calibration::score::{HeldOutResult, Score, jackknife_factor};
 use crate::sim::finger::calibration::session::Session;
 use crate::sim::finger::calibration::shear::ShearComparison;
+use nalgebra::Vector3;
+use palpate_explore::registration::ToolWeight;
 
 /// Table of the electrodes' responses to tangential force, measured and modelled.
 pub(super) fn shear(found: &ShearComparison, stiffness_n_m: f64) -> String {
@@ -106,3 +108,26 @@ pub(super) fn overall(held_out: &[HeldOutResult]) -> String {
     let whole: Vec<Score> = held_out.iter().map(HeldOutResult::overall).collect();
     table(vec![row("all sensors", &Score::of(whole.iter()))])
 }
+/// Returns the weight on a force/torque sensor, fitted to `count` attitudes, in words.
+pub(super) fn weight(found: &ToolWeight, count: usize) -> String {
+    let numbers = |vector: &Vector3<f64>, unit: f64, decimals: usize| {
+        let each = vector.iter().map(|part| format!("{:.decimals$}", part * unit));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let ToolWeight { centre_m, bias, rms: [force_n, torque_nm], largest_n, .. } = found;
+    format!(
+        "{count} attitudes: weight {:.3} N ({:.3} kg), gravity {:.1}° from −z of the base\n\
+         centre of mass ({}) mm in the sensor's frame\nbias ({}) N, ({}) N·m\nwhat remains: {force_n:.3} N \
+         rms per axis, at most {largest_n:.2} N; {:.1} mN·m rms",
+        found.weight_n(),
+        found.weight_n() / STANDARD_GRAVITY,
+        found.tilt_deg(),
+        numbers(centre_m, 1e3, 1),
+        numbers(&bias.force_n, 1.0, 3),
+        numbers(&bias.torque_nm, 1.0, 4),
+        1e3 * torque_nm
+    )
+}
+
+/// Standard gravity, m/s².
+const STANDARD_GRAVITY: f64 = 9.80665;

@@ -1,33 +1,54 @@
 //! Command `palpate identify`.
 
 use super::find::{SCENES, find, find_input};
+use super::fit::{COLUMNS, read_log};
 use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
+use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
-use crate::report::identify::{conclusion, line};
-use crate::study::identify::{self as study, IdentifySpec};
+use crate::report::identify::{conclusion, line, recorded};
+use crate::sim::scene::Unit;
+use crate::study::identify::{self as study, IdentifySpec, RecordedSpec};
 use crate::study::run::start_arm;
-use std::path::PathBuf;
+use anyhow::Context;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(after_help = format!("\
 Examples:
   palpate identify models/lookalikes scenes/lookalikes.toml         one of the folder's objects, drawn
   palpate identify models/suite scenes/suite_library.toml --trial 3 --sure 0.99
   palpate identify my-parts/ my-cell.toml --set library.unit='\"mm\"'    on the arm of [backend]
+  palpate identify my-parts/ --unit mm --contacts contacts.csv        by contacts of a file, without a scene
 
 LIBRARY is a folder of meshes. A scene without [object] draws one of them at a pose of its table [pose]; in a scene with \
 [object], or on a real arm, the object is what is there. Touches end when none of these has the probability --sure, or \
 an object has it, also by those touches alone that were made since it was named. Over ROS 2 the estimated pose is \
 published on /tf as the frame `object`.
 
-Exit codes: 0 sure, 3 undecided after --touches.")]
+With --contacts the object may be anywhere, at any rotation, and the size of the contacts' errors is learned from them: \
+an offset up to --offset-mm outside of the surface, which all have in common, and a deviation of 0.25 to 16 mm, alike for \
+contacts near to each other. Columns of the file:
+{COLUMNS}
+
+Exit codes: 0 sure, 3 undecided after --touches, or less than --sure by --contacts."))]
 pub(super) struct Args {
     /// Folder with the meshes of the objects that may be there.
     #[arg(value_parser = find_input)]
     library: PathBuf,
     /// Scene with a table [pose], or an experiment with such a scene and a [backend].
-    scene: PathBuf,
+    #[arg(required_unless_present = "contacts", conflicts_with = "contacts")]
+    scene: Option<PathBuf>,
+    /// Identify by the contacts of this file (.csv, .parquet).
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["planner", "touches", "trial", "clear_fault", "set"], value_parser = find_input)]
+    contacts: Option<PathBuf>,
+    /// With --contacts: unit of the mesh files.
+    #[arg(long, value_name = "UNIT", default_value_t, requires = "contacts")]
+    unit: Unit,
+    /// With --contacts: largest distance by which all contacts may lie outside of the surface,
+    /// millimetres; 0 if they are on the skin, the fingertip's radius if they are its middle.
+    #[arg(long, value_name = "MM", default_value_t = 8.0, requires = "contacts", value_parser = offset_mm)]
+    offset_mm: f64,
     /// Planner of the touches.
     #[arg(long, default_value = "object_information", value_name = "NAME")]
     planner: String,
@@ -53,7 +74,35 @@ fn probability(text: &str) -> Result<f64, String> {
     value.ok_or("allowed is 0.5 to below 1".into())
 }
 
+fn offset_mm(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value| (0.0..=100.0).contains(value));
+    value.ok_or("allowed is 0 to 100".into())
+}
+
+/// Identifies the object by the contacts of a file.
+fn run_recorded(args: &Args, contacts: &Path, talk: Verbosity) -> anyhow::Result<Completion> {
+    let log = read_log(contacts, talk)?;
+    let spec = RecordedSpec {
+        library: &args.library,
+        unit: args.unit,
+        log: &log,
+        offset_max_m: 1e-3 * args.offset_mm,
+        seed: 0,
+    };
+    let found = report_slow_steps(talk, |tell| {
+        tell("comparing the objects of the library");
+        study::recorded(&spec)
+    })?;
+    print(&recorded(&found, log.contacts().len()))?;
+    let is_sure = found.first().is_some_and(|(_, best)| best.probability >= args.sure);
+    Ok(if is_sure { Completion::Done } else { Completion::Undecided })
+}
+
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
+    if let Some(contacts) = &args.contacts {
+        return run_recorded(args, contacts, talk);
+    }
+    let scene = args.scene.as_deref().context("a scene is missing")?;
     let spec = IdentifySpec {
         library: args.library.clone(),
         planner: args.planner.clone(),
@@ -61,7 +110,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         touches: args.touches,
         trial: args.trial,
     };
-    let experiment = spec.experiment(&find(&args.scene, SCENES)?, &args.set)?;
+    let experiment = spec.experiment(&find(scene, SCENES)?, &args.set)?;
     let mut simulation = prepare_simulation(experiment, talk)?;
     let stop = stop_on_interrupt("touches")?;
     if let Some(arm) = simulation.connect()? {

@@ -12,6 +12,7 @@ mod doctor;
 mod doctor_arm;
 mod export;
 mod find;
+mod fit;
 mod host;
 mod identify;
 mod known_body;
@@ -76,6 +77,7 @@ Examples:
   palpate show scenes/bird_pa10.toml --watch    a trial in a window
   palpate serve experiments/container_pa10.toml   a simulated robot in place of the real one, over ROS 2
   palpate identify models/lookalikes scenes/lookalikes.toml
+  palpate fit contacts.csv                  fit a surface to contacts of your own
   palpate export runs/bird --planner active --out bird.ply
   palpate export scenes/bird.toml           touch the whole zone, write a point cloud
   palpate run experiments/suite/six.toml    compare planners on several objects
@@ -100,6 +102,8 @@ enum Command {
     Live(live::Args),
     /// Identify an object of a library, and its pose, by touch.
     Identify(identify::Args),
+    /// Fit a surface to contacts of a file, and measure its error on held-out groups.
+    Fit(fit::Args),
     /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts or a camera's
     /// view as a point cloud.
     Export(export::Args),
@@ -126,7 +130,7 @@ enum Command {
 
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
-    ("Explore", &["new", "run", "live", "identify", "report", "show", "export"]),
+    ("Explore", &["new", "run", "live", "identify", "fit", "report", "show", "export"]),
     ("Evaluate", &["compare", "benchmark", "check", "accuracy"]),
     ("Robot", &["serve", "register", "calibrate"]),
     ("More", &[]),
@@ -202,6 +206,7 @@ fn run_command(command: Command, talk: Verbosity, host: &Host) -> anyhow::Result
         Command::Show(args) => show::run(&args, talk),
         Command::Live(args) => live::run(&args, talk, host),
         Command::Identify(args) => identify::run(&args, talk),
+        Command::Fit(args) => fit::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
         Command::Compare(args) => compare::run(&args, talk),
         Command::Benchmark(args) => benchmark::run(&args, talk, host),

@@ -3,6 +3,8 @@
 use super::recognition::title;
 use crate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
 use crate::study::identify::IdentifyResult;
+use palpate_explore::recognition::RecordedObject;
+use palpate_gp::math::pose::parts;
 use palpate_input::format::counted;
 
 /// Number of hypotheses in a line.
@@ -34,10 +36,6 @@ pub fn conclusion(result: &IdentifyResult) -> String {
         );
     }
     let pose = &found.pose;
-    let numbers = |values: &[f64], decimals: usize| {
-        let each = values.iter().map(|value| format!("{value:.decimals$}"));
-        each.collect::<Vec<_>>().join(", ")
-    };
     let mut text = format!(
         "{} ({confidence:.3}), after {touches}\nposition_m = [{}]\nrotation_deg = [{}]\nits surface is \
          there within {:.1} mm on average (95 %)",
@@ -54,4 +52,38 @@ pub fn conclusion(result: &IdentifyResult) -> String {
         }
     }
     text
+}
+
+/// Returns the objects with their probabilities, and pose and errors of the likeliest, after
+/// `count` recorded contacts.
+pub fn recorded(found: &[(String, RecordedObject)], count: usize) -> String {
+    let likely: Vec<String> = (found.iter())
+        .take(RECORDED)
+        .map(|(name, it)| format!("{name} {:.3}", it.probability))
+        .collect();
+    let others = found.len().saturating_sub(RECORDED);
+    let others = if others > 0 { format!(", {others} others") } else { String::new() };
+    let head = format!("{}: {}{others}", counted(count, "contact"), likely.join(", "));
+    let Some((name, best)) = found.first() else { return head };
+    let (position_m, rotation_deg) = parts(&best.x_wo);
+    let errors = &best.errors;
+    format!(
+        "{head}\n{name}: contacts lie {:.1} mm from its surface on average, {:.1} mm outside in common; \
+         each errs by {:.1} mm (standard deviation, learned)\nposition_m = [{}]\nrotation_deg = \
+         [{}]\nits surface is there within {:.1} mm on average (95 %)",
+        1e3 * errors.distance_m,
+        1e3 * errors.offset_m,
+        1e3 * errors.sd_m,
+        numbers(&position_m, 4),
+        numbers(&rotation_deg, 1),
+        1e3 * best.distance_95_m
+    )
+}
+
+/// Number of objects of a library that are named.
+const RECORDED: usize = 10;
+
+fn numbers(values: &[f64], decimals: usize) -> String {
+    let each = values.iter().map(|value| format!("{value:.decimals$}"));
+    each.collect::<Vec<_>>().join(", ")
 }

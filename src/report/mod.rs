@@ -17,6 +17,7 @@ pub mod figures;
 pub mod files;
 pub mod film;
 pub mod findings;
+pub mod fit;
 mod glossary;
 pub mod heat_map;
 pub mod html;

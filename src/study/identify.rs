@@ -1,13 +1,18 @@
 //! Identification of an object of a library, and of its pose, by touch.
 
 use super::is_experiment;
+use crate::experiment::contact_log::ContactLog;
 use crate::experiment::metrics::recognition::RecognitionMetrics;
 use crate::experiment::recording::recorded_trial;
 use crate::experiment::trial::TrialEvent;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::Scene;
+use crate::sim::library::LoadedLibrary;
+use crate::sim::library_settings::LibrarySettings;
+use crate::sim::scene::Unit;
 use anyhow::{Context, bail, ensure};
 use palpate_explore::backend::Fault;
+use palpate_explore::recognition::{RecordedObject, recognise};
 use palpate_gp::math::pose::pose;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -129,4 +134,44 @@ pub fn run(
         bail!("{reason}");
     }
     Ok(Some(IdentifyResult { touches, found, is_sure }))
+}
+
+/// Library and log of an identification by recorded contacts.
+pub struct RecordedSpec<'a> {
+    /// Folder with the meshes of the objects that may be there.
+    pub library: &'a Path,
+    /// Unit of the mesh files.
+    pub unit: Unit,
+    /// Contacts, in one frame.
+    pub log: &'a ContactLog,
+    /// Largest distance, m, by which all contacts may lie outside of the surface, e.g. because they
+    /// are middles of fingertips.
+    pub offset_max_m: f64,
+    /// Seed of the poses that are looked at.
+    pub seed: u64,
+}
+
+/// Returns the objects of a library, by name, the most likely first, given recorded contacts.
+///
+/// # Errors
+/// If the library cannot be read.
+pub fn recorded(spec: &RecordedSpec) -> anyhow::Result<Vec<(String, RecordedObject)>> {
+    let settings = LibrarySettings {
+        folder: std::path::absolute(spec.library)?.into(),
+        unit: spec.unit,
+        objects: Vec::new(),
+        unknown: Vec::new(),
+        has_classes: false,
+    };
+    let library = LoadedLibrary::read(&settings)?;
+    let objects = library.known.objects();
+    let (contacts, free) = (spec.log.contacts(), spec.log.free());
+    let found = recognise(&library.known, &contacts, &free, spec.offset_max_m, spec.seed);
+    let named = found.into_iter().map(|found| {
+        let object = &objects[found.object];
+        // Of the mesh's frame, not of its middle.
+        let x_wo = found.x_wo * object.x_om();
+        (object.name.clone(), RecordedObject { x_wo, ..found })
+    });
+    Ok(named.collect())
 }

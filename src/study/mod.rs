@@ -20,6 +20,7 @@ pub mod benchmark;
 pub mod check;
 pub mod compare;
 pub mod export;
+pub mod fit;
 pub mod identify;
 pub mod measure_means;
 pub mod objects;

@@ -22,8 +22,10 @@
 
 pub mod analysis;
 pub mod backend_settings;
+pub mod contact_log;
 #[allow(clippy::module_inception)]
 pub mod experiment;
+pub mod log_table;
 pub mod measure;
 pub mod metrics;
 pub mod notice;
@@ -39,6 +41,7 @@ pub mod statistics;
 pub mod store;
 pub mod sweep;
 pub mod trial;
+pub mod wrench_log;
 
 pub use experiment::Experiment;
 pub use simulation::Simulation;

@@ -3,16 +3,19 @@
 //!
 //! [`RegistrationDesign`] selects the most informative touches of a ball or a plate; [`register`]
 //! makes them with any probe and fits the poses. [`icp`] registers a cloud of contacts to a mesh.
+//! [`ToolWeight`] fits the weight that hangs on a force/torque sensor.
 
 pub mod design;
 pub mod hand_eye;
 pub mod icp;
 mod known_body;
 mod register;
+mod tool_weight;
 mod wrench_fit;
 
 pub use design::RegistrationDesign;
 pub use hand_eye::{HandEyeEstimate, HandEyeFit, RegistrationTouch};
 pub use known_body::{CalibrationBody, FingerOutline};
 pub use register::{RegistrationResult, conclude, register};
+pub use tool_weight::ToolWeight;
 pub use wrench_fit::WrenchErrors;
