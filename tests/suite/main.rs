@@ -100,6 +100,7 @@ mod presence;
 mod probes;
 mod prose;
 mod reach;
+mod real_recordings;
 mod recognition;
 mod recording;
 mod reference;
