@@ -21,12 +21,13 @@ from ._results import (
     BenchmarkResult,
     CheapestScene,
     ConvergenceOrder,
+    FitResult,
     IdentifyResult,
     SuiteComparison,
 )
 from ._run import Comparison, Run
 from ._scene import read_mesh, write_mesh
-from ._studies import accuracy, benchmark, calibrate_band, compare, identify
+from ._studies import accuracy, benchmark, calibrate_band, compare, fit, identify
 
 if TYPE_CHECKING:
     from ._gaussian_process import GaussianProcess
@@ -47,6 +48,7 @@ __all__ = [
     "ConvergenceOrder",
     "Experiment",
     "Exploration",
+    "FitResult",
     "GaussianProcess",
     "IdentifyResult",
     "Run",
@@ -62,6 +64,7 @@ __all__ = [
     "colours",
     "compare",
     "errors",
+    "fit",
     "identify",
     "read_mesh",
     "write_mesh",

@@ -37,13 +37,16 @@ __all__ = [
     "benchmark_experiments",
     "calibrate_band",
     "compare",
+    "fit",
     "identify",
+    "identify_contacts",
     "main",
     "planners",
     "read_mesh",
 ]
 
 _Array = npt.NDArray[np.float64]
+_Contacts = tuple[_Array, _Array | None, _Array | None, Sequence[str] | None]
 
 #: PNG with IPython's metadata.
 _Picture = tuple[bytes, dict[str, float]]
@@ -168,6 +171,26 @@ class Belief:
 
         Raises:
             ValueError: before the first fit, or for another number of heights.
+        """
+    def add(
+        self,
+        points: Sequence[Sequence[float]] | npt.NDArray[np.float64],
+        *,
+        normals: Sequence[Sequence[float]] | npt.NDArray[np.float64] | None = None,
+        sd_m: Sequence[float] | npt.NDArray[np.float64] | None = None,
+        groups: Sequence[str] | None = None,
+    ) -> Belief:
+        """Returns the belief after contacts at `points` (n, 3) in the world frame, fitted again.
+
+        Args:
+            points: points of contact, metres.
+            normals: normals (n, 3) from the surface towards the finger, if they were measured.
+            sd_m: standard deviation of each point, metres.
+            groups: grasp, posture of the arm or session of each contact, whose contacts have an error in common; its
+                size is learned.
+
+        Raises:
+            ValueError: for another number of rows, or a number that is not finite.
         """
     def scaled(self, factor: float) -> Belief:
         """Returns the belief with all length scales multiplied by `factor`.
@@ -623,6 +646,16 @@ def identify(
     trial: int,
     look: Callable[[int, int], None],
     stop: Callable[[], None],
+) -> str: ...
+def fit(
+    contacts: str | _Contacts,
+    *,
+    heights: str | None,
+    look: Callable[[int, int], None],
+    stop: Callable[[], None],
+) -> tuple[Belief, str]: ...
+def identify_contacts(
+    library: str, contacts: str | _Contacts, *, unit: str, offset_max_m: float, sure: float
 ) -> str: ...
 def benchmark_experiments(path: str, objects: str | os.PathLike[str] | None, is_quick: bool) -> list[Experiment]: ...
 def benchmark(path: str, is_quick: bool, runs: Sequence[Run]) -> str: ...

@@ -11,12 +11,15 @@ from ._html import page, picture, preformatted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ._palpate import Belief
+
 __all__ = [
     "AccuracyResult",
     "BandResult",
     "BenchmarkResult",
     "CheapestScene",
     "ConvergenceOrder",
+    "FitResult",
     "IdentifyResult",
     "SuiteComparison",
 ]
@@ -199,6 +202,40 @@ class IdentifyResult(_Study):
     def table(self) -> pd.DataFrame:
         """Returns a row per touch: the probability of each object or class after it, and of none of them as "none"."""
         return _frame(self._history).fillna(0.0)
+
+    def _repr_html_(self) -> str:
+        return preformatted(self._text)
+
+
+@dataclass(frozen=True)
+class FitResult(_Study):
+    """Result of `palpate.fit`.
+
+    Attributes:
+        belief: belief of the surface; its deviations are multiplied by `sd_factor`.
+        rms_m: root mean square distance of held-out contacts from the surface that the other groups give.
+        coverage: share of the held-out contacts within the 95 % band.
+        sd_factor: factor on the deviations with which 95 % of the held-out contacts are in the band; at least 1.
+        common_m: standard deviation of an error that contacts of a group have in common, where it was learned.
+    """
+
+    belief: Belief
+    rms_m: float | None
+    coverage: float | None
+    sd_factor: float
+    common_m: float | None
+    _held_out: _Rows = _hidden()
+    _text: str = _hidden()
+
+    @classmethod
+    def _of(cls, belief: Belief, found: dict[str, Any]) -> FitResult:
+        names = ("rms_m", "coverage", "sd_factor", "common_m")
+        held_out, text = found["held_out"], found["text"]
+        return cls(belief=belief, **{name: found[name] for name in names}, _held_out=held_out, _text=text)
+
+    def table(self) -> pd.DataFrame:
+        """Returns a row per contact: its group, and its distance from the surface that the other groups give."""
+        return _frame(self._held_out)
 
     def _repr_html_(self) -> str:
         return preformatted(self._text)

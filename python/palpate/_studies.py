@@ -8,17 +8,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from . import _palpate
 from ._executor import Executor
 from ._experiment import Experiment
 from ._home import HOME, find_file
 from ._planners import LIMIT_S
 from ._progress import Progress
-from ._results import AccuracyResult, BandResult, BenchmarkResult, IdentifyResult, SuiteComparison
+from ._results import AccuracyResult, BandResult, BenchmarkResult, FitResult, IdentifyResult, SuiteComparison
 from ._run import Run
 from ._settings import assignments
 
-__all__ = ["accuracy", "benchmark", "calibrate_band", "compare", "identify"]
+__all__ = ["accuracy", "benchmark", "calibrate_band", "compare", "fit", "identify"]
 
 
 def accuracy(
@@ -118,10 +120,62 @@ def calibrate_band(
     return BandResult._of(json.loads(found))
 
 
+def fit(
+    contacts: str | os.PathLike[str] | Any,
+    *,
+    normals: Any = None,
+    sd_m: Any = None,
+    groups: Sequence[Any] | None = None,
+    heights: str | None = None,
+    progress: bool | None = None,
+) -> FitResult:
+    """Fits a surface to contacts, as the command `palpate fit` does; no scene and no robot are needed.
+
+        found = palpate.fit("contacts.csv")
+        found = palpate.fit(points, groups=grasps)
+        found.rms_m, found.belief.mesh()
+
+    Args:
+        contacts: file (.csv, .parquet), or points (n, 3), metres.
+        normals: with points, their normals (n, 3) from the surface towards the finger.
+        sd_m: with points, the standard deviation of each, metres.
+        groups: with points, the grasp, posture of the arm or session of each: its contacts have an error in common.
+        heights: fit heights along this axis ("x", "y", "z", "-x", "-y" or "-z") instead of a closed surface.
+        progress: as for `Experiment.run`.
+
+    Raises:
+        ConfigError: if the file is wrong, with its line and column.
+        PalpateError: if the contacts are too few.
+        ValueError: if an argument is wrong.
+    """
+    with Progress("fit", progress, "groups") as look:
+        source = _contacts(contacts, normals, sd_m, groups)
+        belief, found = _palpate.fit(source, heights=heights, look=look, stop=_ignore)
+    return FitResult._of(belief, json.loads(found))
+
+
+def _contacts(contacts: Any, normals: Any = None, sd_m: Any = None, groups: Any = None) -> Any:
+    """Returns a file's path, or points with normals, standard deviations and groups, as the library takes them."""
+    if isinstance(contacts, (str, os.PathLike)):
+        if any(part is not None for part in (normals, sd_m, groups)):
+            raise ValueError("normals, sd_m and groups: allowed with points only; a file has columns of them")
+        return os.fspath(contacts)
+    numbers = [None if part is None else np.asarray(part, float) for part in (contacts, normals, sd_m)]
+    for name, part, shape in zip(("contacts", "normals"), numbers[:2], ("(n, 3)",) * 2, strict=True):
+        if part is not None and (part.ndim != 2 or part.shape[1] != 3):
+            raise ValueError(f"{name} has shape {part.shape}; allowed is {shape}")
+    names = None if groups is None else [str(group) for group in groups]
+    points, normals, sd_m = (None if part is None else part.tolist() for part in numbers)
+    return points, normals, sd_m, names
+
+
 def identify(
     library: str | os.PathLike[str],
-    scene: str | os.PathLike[str],
+    scene: str | os.PathLike[str] | None = None,
     *,
+    contacts: str | os.PathLike[str] | Any = None,
+    unit: str = "m",
+    offset_max_m: float = 0.008,
     planner: str = "object_information",
     sure: float = 0.95,
     touches: int = 30,
@@ -129,14 +183,19 @@ def identify(
     progress: bool | None = None,
     **settings: Any,
 ) -> IdentifyResult:
-    """Identifies an object of a library, and its pose, by touch in simulation, as `palpate identify` does.
+    """Identifies an object of a library, and its pose, by touch in simulation or by contacts, as `palpate identify` does.
 
         found = palpate.identify("models/lookalikes", "lookalikes")
+        found = palpate.identify("my-parts", contacts="contacts.csv", unit="mm")
         found.object, found.table()
 
     Args:
         library: folder with the meshes of the objects that may be there, here or of the package.
         scene: file of a scene with a table [pose], or of an experiment, or the name of a scene of the package.
+        contacts: in place of a scene, contacts: a file (.csv, .parquet), or points (n, 3), metres.
+        unit: with contacts, the unit of the meshes: "m", "cm", "mm", "um" or "in".
+        offset_max_m: with contacts, the largest distance by which all of them may lie outside of the surface, e.g. the
+            radius of a fingertip whose middle they are; 0 if they are on the skin.
         planner: planner of the touches.
         sure: probability at which the object counts as identified, 0.5 to below 1.
         touches: largest number of touches.
@@ -152,9 +211,20 @@ def identify(
     """
     if not 0.5 <= sure < 1:
         raise ValueError(f"sure = {sure}: allowed is 0.5 to below 1")
-    path, folder = find_file(scene, "scenes"), Path(library)
+    folder = Path(library)
     if not folder.is_dir() and (HOME / folder).is_dir():
         folder = HOME / folder
+    if (scene is None) == (contacts is None):
+        raise ValueError("scene, contacts: allowed is one of them")
+    if contacts is not None:
+        if not 0 <= offset_max_m <= 0.1:
+            raise ValueError(f"offset_max_m = {offset_max_m}: allowed is 0 to 0.1")
+        source = _contacts(contacts)
+        found = _palpate.identify_contacts(
+            os.fspath(folder), source, unit=unit, offset_max_m=offset_max_m, sure=sure
+        )
+        return IdentifyResult._of(json.loads(found))
+    path = find_file(scene, "scenes")
     touches, trial = _within("touches", touches, 1, 500), _within("trial", trial, 0, 2**32 - 2)
     with Progress(path.stem, progress, "touches") as look:
         found = _palpate.identify(

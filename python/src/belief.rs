@@ -1,6 +1,7 @@
 //! Belief of a trial, for Python planners and for users of a run.
 
 use crate::ball::Ball;
+use crate::contacts::{self, Contacts};
 use crate::errors;
 use crate::fork;
 use crate::known::{Known, target_numbers};
@@ -10,9 +11,9 @@ use crate::picture::{self, Picture};
 use crate::places::{Places, rows, seen_at};
 use crate::recognition;
 use crate::zone::Zone;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyReadonlyArray2};
-use palpate::explore::belief::HeightField;
+use palpate::explore::belief::{self as explore, HeightField};
 use palpate::explore::evidence::Contact;
 use palpate::explore::surface_evidence::Silhouette;
 use palpate::explore::whole_object::ImplicitSurface;
@@ -21,6 +22,7 @@ use palpate::gp::Posterior;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::reduction::VarianceReduction;
 use palpate::report;
+use palpate::study::fit::evidence;
 use palpate::task::{Aim, Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -297,6 +299,39 @@ impl Belief {
         }
         after.condition().map_err(errors::other)?;
         Ok(Self(after))
+    }
+
+    /// Returns the belief after contacts at `points` (n, 3) in the world frame, fitted again; the
+    /// contacts of a group have an error in common.
+    #[pyo3(signature = (points, *, normals = None, sd_m = None, groups = None))]
+    fn add(
+        &self,
+        py: Python<'_>,
+        points: Vec<[f64; 3]>,
+        normals: Option<Vec<[f64; 3]>>,
+        sd_m: Option<Vec<f64>>,
+        groups: Option<Vec<String>>,
+    ) -> PyResult<Self> {
+        let log = contacts::log(Contacts::Arrays((points, normals, sd_m, groups)))?;
+        let outward = |p_w: &Point3<f64>| match self.0.region() {
+            Region::Ball(ball) => (p_w - ball.centre_w).normalize(),
+            Region::Zone(zone) => -zone.ahead_w().into_inner(),
+        };
+        let evidence = evidence(log.touches.iter(), outward);
+        let after = if let Some(surface) = self.0.implicit_surface() {
+            let mut surface = surface.clone();
+            evidence.iter().for_each(|evidence| surface.add(evidence));
+            explore::Belief::from(surface)
+        } else {
+            let mut field = self.over_zone("add")?.clone();
+            evidence.iter().for_each(|evidence| field.add(evidence));
+            explore::Belief::from(field)
+        };
+        let fitted = fork::detach(py, || {
+            let mut after = after;
+            after.refit().map(|()| after)
+        })?;
+        fitted.map(Self).map_err(errors::other)
     }
 
     /// Returns the belief with all length scales multiplied by `factor`, after the first fit; a

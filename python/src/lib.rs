@@ -7,6 +7,7 @@ mod action_space;
 mod ball;
 mod belief;
 mod columns;
+mod contacts;
 mod desk;
 mod envs;
 mod episode_scene;
@@ -53,6 +54,8 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::Scene>()?;
     module.add_class::<scene::Touch>()?;
     module.add_class::<zone::Zone>()?;
+    module.add_function(wrap_pyfunction!(contacts::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(contacts::identify_contacts, module)?)?;
     module.add_function(wrap_pyfunction!(mesh::read_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(program::main, module)?)?;
     module.add_function(wrap_pyfunction!(program::planners, module)?)?;

@@ -43,25 +43,13 @@ pub(super) struct Args {
     #[arg(value_parser = find_input)]
     contacts: PathBuf,
     /// Fit heights along this axis of the file, over a rectangle, instead of a closed surface.
-    #[arg(long, value_name = "x|y|z|-x|-y|-z", value_parser = axis, allow_hyphen_values = true)]
+    #[arg(long, value_name = "x|y|z|-x|-y|-z", allow_hyphen_values = true)]
     heights: Option<HeightAxis>,
     /// Output folder [default: runs/NAME-fit].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     #[command(flatten)]
     force: Overwrite,
-}
-
-fn axis(text: &str) -> Result<HeightAxis, String> {
-    match text {
-        "x" => Ok(HeightAxis::X),
-        "y" => Ok(HeightAxis::Y),
-        "z" => Ok(HeightAxis::Z),
-        "-x" => Ok(HeightAxis::MinusX),
-        "-y" => Ok(HeightAxis::MinusY),
-        "-z" => Ok(HeightAxis::MinusZ),
-        _ => Err("allowed are x, y, z, -x, -y and -z".into()),
-    }
 }
 
 /// Reads a log, and names the columns that are not used.

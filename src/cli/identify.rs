@@ -11,6 +11,7 @@ use crate::sim::scene::Unit;
 use crate::study::identify::{self as study, IdentifySpec, RecordedSpec};
 use crate::study::run::start_arm;
 use anyhow::Context;
+use palpate_explore::recognition::RecordedObject;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -94,7 +95,9 @@ fn run_recorded(args: &Args, contacts: &Path, talk: Verbosity) -> anyhow::Result
         study::recorded(&spec)
     })?;
     print(&recorded(&found, log.contacts().len()))?;
-    let is_sure = found.first().is_some_and(|(_, best)| best.probability >= args.sure);
+    let is_sure =
+        |best: &RecordedObject| best.probability >= args.sure && best.errors.is_plausible();
+    let is_sure = found.first().is_some_and(|(_, best)| is_sure(best));
     Ok(if is_sure { Completion::Done } else { Completion::Undecided })
 }
 

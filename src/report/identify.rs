@@ -67,10 +67,16 @@ pub fn recorded(found: &[(String, RecordedObject)], count: usize) -> String {
     let Some((name, best)) = found.first() else { return head };
     let (position_m, rotation_deg) = parts(&best.x_wo);
     let errors = &best.errors;
+    let fits = match errors.is_plausible() {
+        true => "",
+        false => {
+            "\nnone of the objects fits the contacts: they err by too much; check the unit and the frame"
+        }
+    };
     format!(
         "{head}\n{name}: contacts lie {:.1} mm from its surface on average, {:.1} mm outside in common; \
          each errs by {:.1} mm (standard deviation, learned)\nposition_m = [{}]\nrotation_deg = \
-         [{}]\nits surface is there within {:.1} mm on average (95 %)",
+         [{}]\nits surface is there within {:.1} mm on average (95 %){fits}",
         1e3 * errors.distance_m,
         1e3 * errors.offset_m,
         1e3 * errors.sd_m,

@@ -18,6 +18,7 @@ use palpate_gp::math::normal::{BAND_95, band_factor};
 use palpate_gp::{LogNormal, MeanModel};
 use rayon::prelude::*;
 use std::f64::consts::E;
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Contacts to fit, and the kind of surface.
@@ -56,6 +57,23 @@ impl HeightAxis {
             Self::MinusX => [0.0, 0.0, 90.0],
             Self::MinusY => [180.0, 0.0, 0.0],
             Self::MinusZ => [-90.0, 0.0, 0.0],
+        }
+    }
+}
+
+impl FromStr for HeightAxis {
+    type Err = String;
+
+    /// Reads its name: x, y, z, -x, -y or -z.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "x" => Ok(Self::X),
+            "y" => Ok(Self::Y),
+            "z" => Ok(Self::Z),
+            "-x" => Ok(Self::MinusX),
+            "-y" => Ok(Self::MinusY),
+            "-z" => Ok(Self::MinusZ),
+            _ => Err("allowed are x, y, z, -x, -y and -z".into()),
         }
     }
 }
@@ -325,7 +343,7 @@ fn contacts_alone() -> Priors {
 
 /// Returns the evidence of touches: the contacts of a group have an error in common. Where a normal
 /// is not known, it points `outward`.
-fn evidence<'a>(
+pub fn evidence<'a>(
     touches: impl Iterator<Item = &'a LoggedTouch>,
     outward: impl Fn(&Point3<f64>) -> Vector3<f64>,
 ) -> Vec<Evidence> {

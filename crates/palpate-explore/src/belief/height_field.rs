@@ -58,9 +58,9 @@ pub struct HeightField {
     /// that a fit takes no longer than without them.
     #[serde(default)]
     pub(super) patches: Observations,
-    /// Whether contacts have errors in common whose size is learned.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub(super) has_postures: bool,
+    /// Number of postures, whose contacts have errors in common of a size that is learned.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub(super) postures: usize,
     /// Contacts to which views are registered.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) touched: Vec<Contact>,
@@ -90,6 +90,10 @@ pub struct HeightField {
     pub(super) reach: OnceLock<MeanGrid>,
 }
 
+fn is_none(count: &usize) -> bool {
+    *count == 0
+}
+
 /// Selection in place of that of a stored belief.
 fn no_kernels() -> KernelSelection {
     KernelSelection::new(&[])
@@ -108,7 +112,7 @@ impl HeightField {
             zone,
             settings,
             patches: contacts.clone(),
-            has_postures: false,
+            postures: 0,
             seen: Vec::new(),
             touched: Vec::new(),
             contacts,
@@ -267,7 +271,12 @@ impl HeightField {
         let middle = || (search_box.signal_sd.low * search_box.signal_sd.high).sqrt();
         let start_sd = (!self.seen.is_empty()).then(|| start_sd.unwrap_or_else(middle));
         let search_box = SearchBox { start_sd, ..search_box };
-        self.kernels.fit(&search_box, observations)
+        let mut fit = self.kernels.fit(&search_box, observations);
+        if self.postures == 1 {
+            // One posture does not show how far others are from it.
+            fit.hyperparameters.common_sd = Some(COMMON_ERROR_M.median);
+        }
+        fit
     }
 
     /// Conditions on all contacts with the given fit, e.g. to draw a recorded belief.
@@ -421,7 +430,7 @@ impl HeightField {
                 (None, None) => TouchNoise::Fitted,
             },
             start_sd: None,
-            common_ratio: self.has_postures.then(|| Range {
+            common_ratio: (self.postures > 1).then(|| Range {
                 low: COMMON_RANGE[0],
                 high: COMMON_RANGE[1],
                 prior: Some(COMMON_ERROR_M.scaled(1.0 / scale)),

@@ -78,7 +78,7 @@ impl HeightField {
             None => (points.clone(), usize::MAX),
         };
         let is_posture = points.source == Some(ErrorSource::Posture);
-        self.has_postures |= is_posture;
+        self.postures += usize::from(is_posture);
         let Some(first) = thinned.points.first() else { return };
         let own_place = self.zone.place(&first.p_wc);
         let target = self.targets.last().unwrap_or(&own_place);

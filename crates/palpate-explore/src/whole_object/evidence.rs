@@ -62,6 +62,8 @@ pub(super) enum CommonError {
     Stated,
     /// Which observations have one: its size is fitted.
     Learned,
+    /// The same, of one posture, which does not show its size: it is that of the prior.
+    Assumed,
 }
 
 /// Assumption about the cameras' poses that registration has found.
@@ -114,12 +116,15 @@ impl SpatialEvidence {
         };
         let mut strokes =
             self.points.iter().filter(|points| points.source == Some(ErrorSource::Stroke));
-        let mut postures =
+        let postures =
             self.points.iter().filter(|points| points.source == Some(ErrorSource::Posture));
         match () {
             () if !self.seen.is_empty() || strokes.any(states) => CommonError::Stated,
-            () if postures.any(|points| points.points.len() > 1) => CommonError::Learned,
-            () => CommonError::None,
+            () => match postures.count() {
+                0 => CommonError::None,
+                1 => CommonError::Assumed,
+                _ => CommonError::Learned,
+            },
         }
     }
 
@@ -155,10 +160,11 @@ impl SpatialEvidence {
         let ObservationModel { prior, ball, noise_m, normals, free_space_samples, .. } = *model;
         let mut all = Observations::new(3);
         let mut source = FIRST_SOURCE;
-        let learned = self.common_error() == CommonError::Learned;
+        let common = self.common_error();
+        let has_postures = matches!(common, CommonError::Learned | CommonError::Assumed);
         for points in &self.points {
             let is_stroke = points.source == Some(ErrorSource::Stroke);
-            let is_posture = learned && points.source == Some(ErrorSource::Posture);
+            let is_posture = has_postures && points.source == Some(ErrorSource::Posture);
             for contact in &points.points {
                 let Contact { p_wc: p_w, normal_w, has_normal, .. } = contact;
                 let sd_m = contact.sd_m();

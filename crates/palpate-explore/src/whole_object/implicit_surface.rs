@@ -337,7 +337,7 @@ impl ImplicitSurface {
         let signals_m = SIGNAL_RANGE.map(|share| share * radius_m);
         let common = self.evidence.common_error();
         ranges.extend(match common {
-            CommonError::None => None,
+            CommonError::None | CommonError::Assumed => None,
             CommonError::Stated => Some(signals_m),
             CommonError::Learned => Some(COMMON_RANGE),
         });
@@ -355,7 +355,7 @@ impl ImplicitSurface {
                 let mut begin = vec![exponent, length_m.ln(), ratio.height.ln()];
                 begin.extend(self.normals().then(|| (ratio.slope * length_m).ln()));
                 begin.extend(match common {
-                    CommonError::None => None,
+                    CommonError::None | CommonError::Assumed => None,
                     CommonError::Stated => Some(start.signal_sd.ln()),
                     CommonError::Learned => Some(ratio.known.ln()),
                 });
@@ -369,7 +369,7 @@ impl ImplicitSurface {
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
         let signal_sd = match common {
             CommonError::Stated => SignalModel::Searched,
-            CommonError::None | CommonError::Learned => {
+            CommonError::None | CommonError::Learned | CommonError::Assumed => {
                 let prior = self.settings.priors.signal.map(|prior| prior.scaled(radius_m));
                 SignalModel::Profiled(Range { low: signals_m[0], high: signals_m[1], prior })
             }
@@ -398,7 +398,11 @@ impl ImplicitSurface {
         })?;
         let (exponent, length_m, ratio) = parameters(&found.x);
         let lengths_m = lengths_m(exponent, length_m).to_vec();
-        let common_sd = is_learned.then_some(ratio.known * signal_sd);
+        let common_sd = match common {
+            CommonError::Learned => Some(ratio.known * signal_sd),
+            CommonError::Assumed => Some(COMMON_ERROR_M.median),
+            CommonError::None | CommonError::Stated => None,
+        };
         let at = Hyperparameters::new(signal_sd, lengths_m, ratio, 0.0);
         Ok(Fit {
             kernel: None,

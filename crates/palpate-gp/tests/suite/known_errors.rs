@@ -10,6 +10,7 @@ use palpate_gp::{
     SearchBox, SignalModel, Slope, TouchNoise,
 };
 use proptest::prelude::*;
+use rand::RngExt;
 
 /// One observation with its known error.
 #[derive(Clone, Debug)]
@@ -242,5 +243,79 @@ fn a_common_offset_is_removed() {
     for place in [[0.1, 0.9], [0.5, 0.5], [0.95, 0.05]] {
         let [a, b] = [&without, &with].map(|posterior| posterior.mean(&place, scratch));
         assert!((a - b).abs() < 0.02, "{a} {b}");
+    }
+}
+
+/// Rows of a plane in groups of five, each off by its own offset of the deviation `offset_sd`.
+fn grouped_rows(offset_sd: f64) -> Vec<Row> {
+    let mut random = palpate_gp::math::seed::stream(4, 0, "offsets");
+    // Nearly normal, with a deviation of one.
+    let mut normal = move || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+    let mut rows = Vec::new();
+    for source in 0..24 {
+        let offset = offset_sd * normal();
+        for i in 0..5 {
+            let place =
+                [f64::from(source % 6) / 5.0 + 0.02 * f64::from(i), f64::from(source / 6) / 3.0];
+            let height = (2.0 * place[0]).sin() + place[1] + offset + 0.01 * normal();
+            let (slope, variance, loadings) = (None, 0.0, [1.0, 0.0]);
+            rows.push(Row {
+                place,
+                height,
+                slope,
+                variance,
+                source: Some(source as usize),
+                loadings,
+            });
+        }
+    }
+    rows
+}
+
+/// The size of errors in common is found, and is small where there are none.
+#[test]
+fn the_size_of_errors_in_common_is_found() {
+    let sought = SearchBox {
+        mean: MeanModel::Constant,
+        length_scales: vec![(0.3, 3.0).into(); 2],
+        noise_ratio: (1e-4, 0.3).into(),
+        slope_noise_ratio: None,
+        signal_sd: (0.1, 10.0).into(),
+        touch_noise: TouchNoise::Fitted,
+        start_sd: None,
+        common_ratio: Some((1e-4, 1.0).into()),
+    };
+    for offset_sd in [0.0, 0.1, 0.3] {
+        let fit = sought.fit(&Matern52, &all(&grouped_rows(offset_sd)));
+        let found = fit.hyperparameters.common_sd.unwrap();
+        let is_near = match offset_sd == 0.0 {
+            true => found < 0.02,
+            false => (0.6..1.6).contains(&(found / offset_sd)),
+        };
+        assert!(is_near, "{found} for {offset_sd}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// The derivative by the ratio of errors in common is that of the profiled likelihood.
+    #[test]
+    fn the_derivative_by_the_ratio_is_that_of_the_value(
+        rows in rows(false), log_ratio in -3.0..0.0_f64,
+    ) {
+        prop_assume!(rows.iter().any(|row| row.source.is_some()));
+        let observations = all(&rows);
+        let mut likelihood = Likelihood::new(&Matern52, MeanModel::Zero, &observations);
+        let scale = SignalModel::Profiled((1e-6, 1e6).into());
+        let mut value = |log: f64, gradient: Option<&mut [f64]>| {
+            let noise = NoiseRatio { height: 0.1, slope: 0.0, known: log.exp() };
+            likelihood.profile(&[0.4, 0.6], noise, &scale, gradient).unwrap().log_likelihood
+        };
+        let mut gradient = [0.0; 4];
+        value(log_ratio, Some(&mut gradient));
+        let step = 1e-5;
+        let slope = (value(log_ratio + step, None) - value(log_ratio - step, None)) / (2.0 * step);
+        prop_assert!((gradient[3] - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{} {slope}", gradient[3]);
     }
 }

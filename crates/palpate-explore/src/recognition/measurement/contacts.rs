@@ -68,6 +68,17 @@ pub struct ContactErrors {
     pub offset_m: f64,
 }
 
+/// Deviation above which contacts are not of the object, m.
+// heuristic: between the two largest deviations, of which no known hand has the first.
+const FOREIGN_M: f64 = 0.012;
+
+impl ContactErrors {
+    /// Whether contacts with these errors may be of the object.
+    pub fn is_plausible(&self) -> bool {
+        self.sd_m < FOREIGN_M
+    }
+}
+
 impl ContactSet {
     /// Creates the evidence of `contacts`, which may all be up to `offset_max_m` outside of the
     /// surface; `None` without any.
