@@ -144,8 +144,7 @@ def fit(
         progress: as for `Experiment.run`.
 
     Raises:
-        ConfigError: if the file is wrong, with its line and column.
-        PalpateError: if the contacts are too few.
+        PalpateError: if the file is wrong, with its line and column, or the contacts are too few.
         ValueError: if an argument is wrong.
     """
     with Progress("fit", progress, "groups") as look:

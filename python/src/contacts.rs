@@ -31,7 +31,7 @@ type Arrays = (Vec<[f64; 3]>, Option<Vec<[f64; 3]>>, Option<Vec<f64>>, Option<Ve
 /// Reads contacts.
 pub(crate) fn log(contacts: Contacts) -> PyResult<ContactLog> {
     match contacts {
-        Contacts::File(path) => ContactLog::read(&path).map_err(errors::config),
+        Contacts::File(path) => ContactLog::read(&path).map_err(errors::other),
         Contacts::Arrays(arrays) => of_arrays(arrays),
     }
 }

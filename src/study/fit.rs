@@ -232,7 +232,7 @@ fn folds(touches: &[&LoggedTouch], has_groups: bool) -> Vec<usize> {
 /// Region and settings of a fit, which all folds share.
 enum Model {
     Ball { scope: ExplorationSetup, settings: SpatialGpSettings },
-    Zone { zone: Zone, settings: GpSettings },
+    Zone { zone: Zone, settings: Box<GpSettings> },
 }
 
 impl Model {
@@ -293,7 +293,7 @@ impl Model {
             normals: has_normals,
             ..GpSettings::default()
         };
-        Self::Zone { zone, settings }
+        Self::Zone { zone, settings: Box::new(settings) }
     }
 
     /// Returns the belief after `touches`, with deviations times `sd_factor`.
@@ -311,7 +311,7 @@ impl Model {
                 surface.into()
             }
             Self::Zone { zone, settings } => {
-                let settings = GpSettings { sd_inflation: sd_factor, ..settings.clone() };
+                let settings = GpSettings { sd_inflation: sd_factor, ..(**settings).clone() };
                 let mut field = HeightField::new(zone.clone(), settings);
                 evidence.iter().for_each(|evidence| field.add(evidence));
                 field.into()

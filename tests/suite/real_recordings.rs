@@ -61,7 +61,8 @@ const STICK_M: f64 = 0.15;
 
 /// Origin, axis, limits (deg) and speed (deg/s) of each joint (ABB, product specification IRB 120,
 /// 3HAC035960-001).
-const JOINTS: [([f64; 3], [f64; 3], [f64; 2], f64); 6] = [
+type JointRow = ([f64; 3], [f64; 3], [f64; 2], f64);
+const JOINTS: [JointRow; 6] = [
     ([0.0, 0.0, 0.29], [0.0, 0.0, 1.0], [-165.0, 165.0], 250.0),
     ([0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-110.0, 110.0], 250.0),
     ([0.0, 0.0, 0.27], [0.0, 1.0, 0.0], [-110.0, 70.0], 250.0),

@@ -197,7 +197,8 @@ impl Columns {
         if let Some(covariance) = self.covariance.as_ref().filter(|it| row.has(&it[..])) {
             let [xx, xy, xz, yy, yz, zz] = row.numbers(covariance)?;
             let covariance_w = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-            if !(covariance_w.symmetric_eigenvalues().min() >= -1e-12) {
+            let is_positive = covariance_w.symmetric_eigenvalues().min() >= -1e-12;
+            if !is_positive {
                 let problem = "the covariance is not positive";
                 return Err(InputError::new(problem).at("cov_xx … cov_zz"));
             }

@@ -100,7 +100,8 @@ fn solve(
     }
     let svd = a.clone().svd(true, true);
     let values = &svd.singular_values;
-    if !(values.max() <= CONDITION * values.min()) {
+    let is_determined = values.max() <= CONDITION * values.min();
+    if !is_determined {
         return None;
     }
     let found = svd.solve(&y, 0.0).ok()?;
