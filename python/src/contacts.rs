@@ -72,8 +72,8 @@ fn of_arrays((points, normals, sds, groups): Arrays) -> PyResult<ContactLog> {
     Ok(ContactLog { touches, has_groups: groups.is_some(), unread: Vec::new() })
 }
 
-/// Fits a surface to contacts, as the command `palpate fit` does; returns the belief and the rest as
-/// JSON. `look` and `stop` are those of `Experiment.run`.
+/// Fits a surface to contacts, as the command `palpate fit` does; returns the belief and the rest
+/// as JSON. `look` and `stop` are those of `Experiment.run`.
 #[pyfunction]
 #[pyo3(signature = (contacts, *, heights, look, stop))]
 pub(crate) fn fit(

@@ -41,10 +41,9 @@ With --band, runs trials on objects whose surface is known and fits the two half
 regression. Writes band.toml, the table [gp.band] of an experiment, and reliability.svg. The printed coverage is that \
 of objects left out of the learning.
 
-With --weight, fits weight, centre of mass and bias to readings at rest in four or more attitudes. Columns: qx, qy, qz, qw \
-(rotation of the sensor in the robot's base, a unit quaternion), fx, fy, fz (N) and tx, ty, tz (N·m). A touch tares the \
-sensor in its own attitude, so that the weight is in no contact; the arm's controller and the force interlock need it: \
-enter weight and centre as the payload on the robot.")]
+With --weight, fits weight, centre of mass and bias to readings at rest in four or more attitudes: columns qx, qy, qz, qw \
+(rotation of the sensor in the base), fx, fy, fz (N), tx, ty, tz (N·m). Enter them as the payload of the robot; a touch \
+tares its sensor.")]
 pub struct Args {
     /// Recordings; the format is that of models/biotac/flat_plate.json.
     #[arg(value_parser = find_input, required_unless_present_any = ["band", "weight"], conflicts_with_all = ["test", "trials", "set", "threads"])]
@@ -64,10 +63,10 @@ pub struct Args {
     /// With --band, folder for the results [default: runs/band-EXPERIMENT].
     #[arg(long, value_name = "FILE|FOLDER", conflicts_with_all = ["attitude_only", "shear"])]
     out: Option<PathBuf>,
-    /// Fit the weight on a force/torque sensor to readings at rest in this file (.csv, .parquet).
+    /// Fit the weight on a force/torque sensor to readings at rest.
     #[arg(long, value_name = "FILE", value_parser = find_input, conflicts_with_all = ["recordings", "band", "out", "attitude_only", "shear"])]
     weight: Option<PathBuf>,
-    /// With --weight: the wrenches are in the frame of the robot's base.
+    /// With --weight: wrenches are in the base frame.
     #[arg(long, requires = "weight")]
     in_base: bool,
     #[command(flatten)]

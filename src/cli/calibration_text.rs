@@ -111,7 +111,10 @@ pub(super) fn overall(held_out: &[HeldOutResult]) -> String {
 /// Returns the weight on a force/torque sensor, fitted to `count` attitudes, in words.
 pub(super) fn weight(found: &ToolWeight, count: usize) -> String {
     let numbers = |vector: &Vector3<f64>, unit: f64, decimals: usize| {
-        let each = vector.iter().map(|part| format!("{:.decimals$}", part * unit));
+        // Without the sign of a zero.
+        let place = 10f64.powi(decimals as i32);
+        let tidy = |part: f64| (part * unit * place).round() / place + 0.0;
+        let each = vector.iter().map(|part| format!("{:.decimals$}", tidy(*part)));
         each.collect::<Vec<_>>().join(", ")
     };
     let ToolWeight { centre_m, bias, rms: [force_n, torque_nm], largest_n, .. } = found;

@@ -12,37 +12,28 @@ use anyhow::Context;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-/// Columns of a log, for the help of commands.
-pub(super) const COLUMNS: &str = "\
-A row is a touch. Columns, in metres (a name that ends in _mm: millimetres; the end _m may be left out):
-  x_m, y_m, z_m                        point of contact; of a miss the middle of the fingertip at its end
-  group                                grasp, posture of the arm, or session: its contacts are off together
-  nx, ny, nz                           normal, from the surface towards the finger
-  sd_m, or cov_xx cov_xy … cov_zz      standard deviation along the normal, or covariance, m²
-  end                                  contact (default) or miss
-  from_x_m, from_y_m, from_z_m, radius_m    where the middle of the fingertip began to move straight to its end, through \
-free space, and its radius
-All but the first three are optional; others are named and not used. Lines that begin with # are comments.";
-
 #[derive(clap::Args)]
-#[command(after_help = format!("\
+#[command(after_help = "\
 Examples:
   palpate fit contacts.csv                       closed surface around a whole object
-  palpate fit contacts.parquet --out runs/mug
-  palpate fit plate.csv --heights z              height field: heights along z over x and y
+  palpate fit plate.parquet --heights z          heights along z over x and y
 
-CONTACTS is a CSV file with a line of names first, or a Parquet file.
-{COLUMNS}
+A row is a touch; only the first three columns are needed. An end _mm of a name is millimetres:
+  x_m, y_m, z_m                     contact; of a miss the middle of the fingertip at its end
+  group                             grasp, posture or session, whose contacts are off together
+  nx, ny, nz                        normal towards the finger
+  sd_m, or cov_xx cov_xy … cov_zz   standard deviation, or covariance, m²
+  end                               contact or miss
+  from_x_m, from_y_m, from_z_m, radius_m    straight path of the fingertip's middle to the end, and its radius
 
-Writes FOLDER/index.html, surface.ply (with the property sigma_m), held_out.csv and belief.json. Each group is left out in \
-turn and predicted by the others: that is the error that the page states, and standard deviations are multiplied by the \
-factor with which 95 % of the held-out contacts are in the band. Without groups each twentieth of the contacts is left \
-out."))]
+Writes FOLDER/index.html, surface.ply (with sigma_m), held_out.csv and belief.json. Each group, or each twentieth of the \
+contacts, is left out in turn and predicted by the others: the error that the page states. Standard deviations are \
+multiplied by the factor with which 95 % of the held-out contacts are in the band.")]
 pub(super) struct Args {
     /// File with contacts (.csv, .parquet).
     #[arg(value_parser = find_input)]
     contacts: PathBuf,
-    /// Fit heights along this axis of the file, over a rectangle, instead of a closed surface.
+    /// Fit heights along this axis instead of a closed surface.
     #[arg(long, value_name = "x|y|z|-x|-y|-z", allow_hyphen_values = true)]
     heights: Option<HeightAxis>,
     /// Output folder [default: runs/NAME-fit].

@@ -1,7 +1,7 @@
 //! Command `palpate identify`.
 
 use super::find::{SCENES, find, find_input};
-use super::fit::{COLUMNS, read_log};
+use super::fit::read_log;
 use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
 use super::slow_steps::report_slow_steps;
@@ -15,7 +15,7 @@ use palpate_explore::recognition::RecordedObject;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(after_help = format!("\
+#[command(after_help = "\
 Examples:
   palpate identify models/lookalikes scenes/lookalikes.toml         one of the folder's objects, drawn
   palpate identify models/suite scenes/suite_library.toml --trial 3 --sure 0.99
@@ -27,12 +27,10 @@ LIBRARY is a folder of meshes. A scene without [object] draws one of them at a p
 an object has it, also by those touches alone that were made since it was named. Over ROS 2 the estimated pose is \
 published on /tf as the frame `object`.
 
-With --contacts the object may be anywhere, at any rotation, and the size of the contacts' errors is learned from them: \
-an offset up to --offset-mm outside of the surface, which all have in common, and a deviation of 0.25 to 16 mm, alike for \
-contacts near to each other. Columns of the file:
-{COLUMNS}
+With --contacts the object may be anywhere, at any rotation. The contacts' errors are learned: an offset up to --offset-mm \
+that all have in common, and a deviation of 0.25 to 16 mm. `palpate fit --help` lists the columns.
 
-Exit codes: 0 sure, 3 undecided after --touches, or less than --sure by --contacts."))]
+Exit codes: 0 sure, 3 undecided after --touches, or less than --sure by --contacts.")]
 pub(super) struct Args {
     /// Folder with the meshes of the objects that may be there.
     #[arg(value_parser = find_input)]
@@ -40,14 +38,13 @@ pub(super) struct Args {
     /// Scene with a table [pose], or an experiment with such a scene and a [backend].
     #[arg(required_unless_present = "contacts", conflicts_with = "contacts")]
     scene: Option<PathBuf>,
-    /// Identify by the contacts of this file (.csv, .parquet).
+    /// Identify by contacts of a file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["planner", "touches", "trial", "clear_fault", "set"], value_parser = find_input)]
     contacts: Option<PathBuf>,
-    /// With --contacts: unit of the mesh files.
+    /// With --contacts: unit of the meshes.
     #[arg(long, value_name = "UNIT", default_value_t, requires = "contacts")]
     unit: Unit,
-    /// With --contacts: largest distance by which all contacts may lie outside of the surface,
-    /// millimetres; 0 if they are on the skin, the fingertip's radius if they are its middle.
+    /// With --contacts: largest common distance outside of the surface, e.g. a fingertip's radius.
     #[arg(long, value_name = "MM", default_value_t = 8.0, requires = "contacts", value_parser = offset_mm)]
     offset_mm: f64,
     /// Planner of the touches.

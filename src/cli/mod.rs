@@ -102,7 +102,7 @@ enum Command {
     Live(live::Args),
     /// Identify an object of a library, and its pose, by touch.
     Identify(identify::Args),
-    /// Fit a surface to contacts of a file, and measure its error on held-out groups.
+    /// Fit a surface to contacts of a file.
     Fit(fit::Args),
     /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts or a camera's
     /// view as a point cloud.

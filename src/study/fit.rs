@@ -100,8 +100,8 @@ pub struct HeldOut {
     pub group: String,
     /// Point of contact.
     pub p_w: Point3<f64>,
-    /// Predicted distance outside the surface, with the standard deviation of a touch, m, multiplied
-    /// by the factor of the other groups.
+    /// Predicted distance outside the surface, with the standard deviation of a touch, m,
+    /// multiplied by the factor of the other groups.
     pub deviation: Deviation,
     /// Distance from the estimated surface, m.
     pub distance_m: f64,
@@ -152,8 +152,8 @@ const BEYOND: f64 = 0.05;
 // heuristic: a few per cent of the object.
 const CELLS: u32 = 40;
 
-/// Fits a surface; `None` if `stop` became true. `progress` is called with the number of groups that
-/// were left out, and of all.
+/// Fits a surface; `None` if `stop` became true. `progress` is called with the number of groups
+/// that were left out, and of all.
 ///
 /// # Errors
 /// If there are fewer than three contacts, or their covariance cannot be factored.

@@ -51,6 +51,7 @@ mod finger_parts;
 mod finger_signals;
 mod fit;
 mod folders;
+mod foreign_recordings;
 mod formats;
 #[cfg(all(feature = "franka", feature = "mujoco"))]
 mod franka;
@@ -136,3 +137,4 @@ mod twin;
 mod twin_faults;
 mod views;
 mod whole;
+mod wrench_logs;

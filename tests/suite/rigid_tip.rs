@@ -78,7 +78,9 @@ fn locate(
 fn measured(effect: &WrenchEffect, seed: u64) -> impl FnMut(&Wrench, f64) -> Wrench {
     let mut gauge = WrenchSensor::new(effect, ChaCha8Rng::seed_from_u64(seed));
     move |load, dt_s| {
-        gauge.read(effect, &load.moved(&x_mt()), &Point3::origin(), dt_s).moved(&x_mt().inverse())
+        gauge
+            .read(effect, &load.moved(&x_mt()), &Point3::origin(), false, dt_s)
+            .moved(&x_mt().inverse())
     }
 }
 

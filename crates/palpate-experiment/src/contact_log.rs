@@ -3,17 +3,16 @@
 //! A row is a touch. Lengths are in metres, unless the name of their column ends in `_mm`; an
 //! ending `_m` or `_s` of a name may be left out:
 //!
-//! | column | contents |
-//! |---|---|
-//! | `x_m`, `y_m`, `z_m` | point of contact; for a miss the middle of the fingertip at its end |
-//! | `group` | grasp, posture of the arm, or session, whose contacts have an error in common |
-//! | `nx`, `ny`, `nz` | normal, from the surface towards the finger |
-//! | `sd_m` | standard deviation of the point along the normal |
-//! | `cov_xx`, `cov_xy`, `cov_xz`, `cov_yy`, `cov_yz`, `cov_zz` | covariance of the point, m² |
-//! | `end` | `contact`, the default, or `miss` |
-//! | `from_x_m`, `from_y_m`, `from_z_m` | where the middle of the fingertip began to move straight to its end, through free space |
-//! | `radius_m` | radius of the fingertip, needed for its path |
-//! | `time_s` | time, which is not used |
+//! * `x_m`, `y_m`, `z_m`: point of contact; for a miss the middle of the fingertip at its end
+//! * `group`: grasp, posture of the arm, or session, whose contacts have an error in common
+//! * `nx`, `ny`, `nz`: normal, from the surface towards the finger
+//! * `sd_m`: standard deviation of the point along the normal
+//! * `cov_xx`, `cov_xy`, `cov_xz`, `cov_yy`, `cov_yz`, `cov_zz`: covariance of the point, m²
+//! * `end`: `contact`, the default, or `miss`
+//! * `from_x_m`, `from_y_m`, `from_z_m`: where the middle of the fingertip began to move straight
+//!   to its end, through free space
+//! * `radius_m`: radius of the fingertip, needed for its path
+//! * `time_s`: time, which is not used
 
 use crate::log_table::{LENGTHS, LogColumn, LogColumns, LogRow, LogTable, PLAIN, SQUARES};
 use nalgebra::{Matrix3, Point3, UnitQuaternion, UnitVector3, Vector3};

@@ -9,9 +9,9 @@ use std::path::Path;
 /// Frame in which the wrenches of a file are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WrenchFrame {
-    /// That of the sensor.
+    /// Frame of the sensor.
     Sensor,
-    /// That of the robot's base.
+    /// Frame of the robot's base.
     Base,
 }
 

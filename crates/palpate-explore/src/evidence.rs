@@ -141,8 +141,8 @@ impl From<SeenSurface> for Evidence {
 pub struct SurfacePoints {
     /// The points.
     pub points: Vec<Contact>,
-    /// Source of an error that the points have in common; if omitted, each point has an error of its
-    /// own.
+    /// Source of an error that the points have in common; if omitted, each point has an error of
+    /// its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<ErrorSource>,
 }

@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Prior of the error that contacts of one posture have in common, m. Arms repeat to 0.1 mm (data
-/// sheets of PA-10 and Franka Panda), contacts of an arm's stick with a tracked object err by 0.3 mm
-/// (mcubelab/push-est-public, commit 334c7a1), and hands by millimetres.
+/// sheets of PA-10 and Franka Panda), contacts of an arm's stick with a tracked object err by 0.3
+/// mm (mcubelab/push-est-public, commit 334c7a1), and hands by millimetres.
 // heuristic: between the first two, and the spread.
 pub const COMMON_ERROR_M: LogNormal = LogNormal { median: 2e-4, spread: 10.0 };
 
@@ -51,8 +51,9 @@ pub struct GpSettings {
     pub band: Band,
     /// Log-normal priors of the hyperparameters.
     pub prior: Priors,
-    /// Factor applied to the standard deviations.
+    /// Factor applied to the standard deviations; set by a fit to recorded contacts.
     #[serde(skip_serializing_if = "is_one")]
+    #[schemars(skip)]
     pub sd_inflation: f64,
 }
 

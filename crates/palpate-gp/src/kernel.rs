@@ -30,8 +30,8 @@ pub struct Hyperparameters {
     /// Standard deviation of an observed slope's error; 0 without observed slopes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub slope_noise_sd: f64,
-    /// Standard deviation of an error in common, where its size is fitted; `None` where observations
-    /// state it.
+    /// Standard deviation of an error in common, where its size is fitted; `None` where
+    /// observations state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub common_sd: Option<f64>,
     /// Prior mean, to which the belief returns far from all observations.
@@ -52,8 +52,8 @@ impl Hyperparameters {
         }
     }
 
-    /// Standard deviation of the error of a touch that has none in common with those before: that of
-    /// its own, and one in common whose size is fitted.
+    /// Standard deviation of the error of a touch that has none in common with those before: that
+    /// of its own, and one in common whose size is fitted.
     pub fn touch_sd(&self) -> f64 {
         self.common_sd.map_or(self.noise_sd, |common_sd| self.noise_sd.hypot(common_sd))
     }

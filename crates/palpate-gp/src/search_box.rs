@@ -48,8 +48,8 @@ pub enum TouchNoise {
 }
 
 impl SearchBox {
-    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio, and signal or
-    /// errors in common, if they are searched.
+    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio, and signal
+    /// or errors in common, if they are searched.
     pub(super) fn ranges(&self) -> impl Iterator<Item = Range> {
         // A known noise and a range of the signal determine a range of their ratio.
         let noise_ratio = match self.touch_noise {

@@ -126,7 +126,9 @@ impl SimulatedFinger {
         reading.wrench =
             self.gauge.as_mut().zip(scene.effects.wrench.as_ref()).map(|(gauge, effect)| {
                 let load = mount.moved(&self.x_mt);
-                gauge.read(effect, &load, &self.p_wt, period_s).moved(&self.x_mt.inverse())
+                let is_touching = self.load.force_n.norm_squared() > 0.0;
+                let said = gauge.read(effect, &load, &self.p_wt, is_touching, period_s);
+                said.moved(&self.x_mt.inverse())
             });
     }
 

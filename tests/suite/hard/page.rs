@@ -14,16 +14,15 @@ const HEAD: &str = "# Hard cases
 
 Written by `make test PART=hard-cases`, which runs every case of `tests/suite/hard` at every severity and, where time
 matters, at every control period or time step. [physics.md](physics.md#where-the-simulation-breaks) says what helps.
-`make test` runs each case at the hardest severity that must hold.
 
-The column *tested* gives the easiest and the hardest severity. The column *outcomes* lists the severities that did not hold everywhere. Behind each stands one letter for each period or step:
+The column *tested* gives the easiest and the hardest severity. The column *outcomes* lists the severities that did not hold everywhere, with a letter for each period or step:
 
 | letter | outcome |
 |---|---|
 | `h` | held: the law of the case was kept |
 | `f` | fault: it ended with a fault that gives time and state, or was refused at the start |
 | `w` | wrong, without a fault, for the known reason that its line gives |
-| `U` | unexplained: a fault or a broken law where the law must hold; there must be none |
+| `U` | unexplained; there must be none |
 
 ";
 
@@ -121,8 +120,7 @@ fn line(case: &Case, verdicts: &[Verdict]) -> String {
     let first = verdicts.iter().find(|verdict| verdict.outcome != Outcome::Stable);
     let mut beyond = first.map_or(String::new(), |verdict| match &verdict.outcome {
         Outcome::Stable => String::new(),
-        Outcome::Faulted(words) => format!("fault: {}", cut(words)),
-        Outcome::Wrong(words) => format!("wrong: {}", cut(words)),
+        Outcome::Faulted(words) | Outcome::Wrong(words) => cut(words),
     });
     if verdicts.iter().any(|verdict| rank(verdict) == 2) {
         beyond += &format!(" ({})", case.known);
@@ -172,7 +170,7 @@ fn margins() -> String {
 
 /// Returns the start of a message, because some contain a whole state.
 fn cut(words: &str) -> String {
-    const MOST: usize = 60;
+    const MOST: usize = 30;
     // A fault's state follows "with".
     let words = words.split(" with ").next().unwrap_or(words);
     match words.chars().count() > MOST {

@@ -68,8 +68,8 @@ impl HeightField {
         }
     }
 
-    /// Adds points of the surface. Of a stroke, some are dense enough, and some of these take part in
-    /// fits; of one posture all do, of others the first one.
+    /// Adds points of the surface. Of a stroke, some are dense enough, and some of these take part
+    /// in fits; of one posture all do, of others the first one.
     fn add_points(&mut self, points: &SurfacePoints) {
         let source = points.source.map(|_| FIRST_SOURCE + self.touched.len());
         let (thinned, fitted) = match points.source {

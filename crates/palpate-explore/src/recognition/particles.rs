@@ -106,8 +106,8 @@ impl Particles {
         self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
     }
 
-    /// Returns the pose of `object` with the smallest expected distance of surfaces, and the distance
-    /// that it exceeds with a probability of 5 %, m.
+    /// Returns the pose of `object` with the smallest expected distance of surfaces, and the
+    /// distance that it exceeds with a probability of 5 %, m.
     pub fn central(&self, object: &LibraryObject) -> (Isometry3<f64>, f64) {
         let weighted: Vec<_> = self.weighted().collect();
         let drawn = systematic(weighted.iter().map(|it| it.1), ESTIMATED, 0.5);

@@ -1,8 +1,8 @@
 //! Weight of what hangs on a force/torque sensor, from readings at rest in several attitudes.
 //!
 //! With the rotation R of the sensor in `W`, the force of gravity g in `W`, the centre of mass c in
-//! the sensor's frame, and a bias, it reads f = Rᵀg + f₀ and τ = c × Rᵀg + τ₀: linear least squares,
-//! first for g and f₀, then for c and τ₀.
+//! the sensor's frame, and a bias, it reads f = Rᵀg + f₀ and τ = c × Rᵀg + τ₀: linear least
+//! squares, first for g and f₀, then for c and τ₀.
 
 use crate::robot::sensor::Wrench;
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};

@@ -53,14 +53,14 @@ impl FreeVolume {
     }
 }
 
-/// What is known of the errors that observations have in common.
+/// Errors that observations have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CommonError {
     /// There are none.
     None,
-    /// Their size.
+    /// Errors of known size.
     Stated,
-    /// Which observations have one: its size is fitted.
+    /// Errors of an unknown size, which is fitted.
     Learned,
     /// The same, of one posture, which does not show its size: it is that of the prior.
     Assumed,
@@ -108,8 +108,8 @@ impl SpatialEvidence {
         }
     }
 
-    /// Returns what is known of errors in common: their size, where there are views or strokes whose
-    /// sensor states it.
+    /// Returns what is known of errors in common: their size, where there are views or strokes
+    /// whose sensor states it.
     pub(super) fn common_error(&self) -> CommonError {
         let states = |points: &SurfacePoints| {
             points.points.iter().any(|contact| contact.covariance_w.is_some())
@@ -152,10 +152,10 @@ impl SpatialEvidence {
 
     /// Returns the observations of the field relative to the prior mean. At each contact the field
     /// is 0, with the normal as its gradient if normals are observed; points of a stroke have an
-    /// error in common in the size that each states, those of a posture are off by one vector. At the centre of each swept ball inside the model's
-    /// ball it is the distance to the nearest contact. That is the upper bound of a distance there,
-    /// and the swept radius the lower bound: the standard deviation is that of a uniform
-    /// distribution between them.
+    /// error in common in the size that each states, those of a posture are off by one vector. At
+    /// the centre of each swept ball inside the model's ball it is the distance to the nearest
+    /// contact. That is the upper bound of a distance there, and the swept radius the lower bound:
+    /// the standard deviation is that of a uniform distribution between them.
     pub(super) fn observations(&self, model: &ObservationModel) -> Observations {
         let ObservationModel { prior, ball, noise_m, normals, free_space_samples, .. } = *model;
         let mut all = Observations::new(3);

@@ -21,9 +21,11 @@ pub struct SpatialGpSettings {
     /// Bounds of the normals' noise, in units of the field's standard deviation over the length
     /// scale.
     pub slope_noise: [f64; 2],
-    /// Log-normal priors of the length scales' mean, of the noise and of the signal, the latter as a
-    /// fraction of the radius of the ball around the contacts; flat if omitted.
+    /// Log-normal priors of the length scales' mean, of the noise and of the signal, the latter as
+    /// a fraction of the radius of the ball around the contacts; flat if omitted. Set by a fit to
+    /// recorded contacts.
     #[serde(skip_serializing_if = "is_default")]
+    #[schemars(skip)]
     pub priors: Priors,
     /// Whether contact normals are observed, as gradients of the field; requires the kernel
     /// `matern_52`.

@@ -65,8 +65,8 @@ const BLIND_SHARE: f64 = 1.5;
 struct Standstill {
     stuck_s: f64,
     blind_s: f64,
-    /// Time since which each joint should have changed its position. A last part of a motion that is
-    /// smaller than a step of the readings is not seen either, and a rest may follow it.
+    /// Time since which each joint should have changed its position. A last part of a motion that
+    /// is smaller than a step of the readings is not seen either, and a rest may follow it.
     since_s: [Option<f64>; MAX_JOINTS],
 }
 

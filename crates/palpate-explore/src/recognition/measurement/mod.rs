@@ -39,8 +39,8 @@ pub enum MeasurementFit {
 }
 
 impl Measurement {
-    /// Returns the points of contact, in `W`, each with its normal, if its sensor has one; of a touch
-    /// the first.
+    /// Returns the points of contact, in `W`, each with its normal, if its sensor has one; of a
+    /// touch the first.
     pub fn touched_w(&self) -> impl Iterator<Item = (Point3<f64>, Option<Vector3<f64>>)> {
         let (contacts, touch) = match self {
             Self::Contacts(contacts) => (Some(contacts.touched_w()), None),

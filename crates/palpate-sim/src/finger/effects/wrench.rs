@@ -30,8 +30,8 @@ effect! {
         /// Change of the force bias with the arm's posture: standard deviation per metre of motion
         /// of the tip along each axis.
         posture_n_m: f64, 0.0..=1e3;
-        /// Further noise of a loaded tip that moves, as a multiple of that at rest per m/s of its
-        /// speed.
+        /// Further noise of a tip that moves while it touches, as a multiple of that at rest per
+        /// m/s of its speed.
         motion_noise_s_m: f64, 0.0..=1e3;
         /// Largest force reading along x, y, z; 0 for no limit.
         range_n: [f64; 3], 0.0..=1e6;
@@ -92,12 +92,14 @@ impl WrenchSensor {
         Self { rng, bias, posture_n_m, start_w: None, last_w: None }
     }
 
-    /// Returns the reading of a load with the tip at `p_wt`, `dt_s` after the last one.
+    /// Returns the reading of a load with the tip at `p_wt`, which may touch the object, `dt_s`
+    /// after the last one.
     pub fn read(
         &mut self,
         effect: &WrenchEffect,
         load: &Wrench,
         p_wt: &Point3<f64>,
+        is_touching: bool,
         dt_s: f64,
     ) -> Wrench {
         let noise = effect.noise_n.iter().chain(&effect.noise_nm);
@@ -106,8 +108,7 @@ impl WrenchSensor {
         let turned_n = self.posture_n_m * (p_wt - *self.start_w.get_or_insert(*p_wt));
         let walk = dt_s.max(0.0).sqrt();
         let moved_m = (p_wt - self.last_w.replace(*p_wt).unwrap_or(*p_wt)).norm();
-        let is_loaded = load.force_n.norm_squared() > 0.0 && dt_s > 0.0;
-        let speed_m_s = if is_loaded { moved_m / dt_s } else { 0.0 };
+        let speed_m_s = if is_touching && dt_s > 0.0 { moved_m / dt_s } else { 0.0 };
         let louder = 1.0 + effect.motion_noise_s_m * speed_m_s;
         let mut said = *load;
         said.force_n += turned_n;
@@ -135,33 +136,32 @@ mod tests {
     use nalgebra::Vector3;
     use palpate_gp::math::seed;
 
-    /// The noise of a loaded tip doubles at 70 mm/s and triples at 140 mm/s; without a load it does
-    /// not change.
+    /// The noise of a tip that touches doubles at 70 mm/s and triples at 140 mm/s; otherwise it
+    /// does not change.
     #[test]
-    fn noise_rises_with_the_speed_of_a_loaded_tip() {
+    fn noise_rises_with_the_speed_of_a_tip_that_touches() {
         let effect = WrenchEffect {
             resolution_n: [0.0; 3],
             bias_n: 0.0,
             drift_n_sqrt_s: [0.0; 3],
             ..WrenchEffect::default()
         };
-        let noise_n = |speed_m_s: f64, load_n: f64| {
+        let noise_n = |speed_m_s: f64, is_touching: bool| {
             let mut sensor = WrenchSensor::new(&effect, seed::stream(1, 0, "wrench"));
-            let load =
-                Wrench { force_n: Vector3::new(0.0, 0.0, load_n), torque_nm: Vector3::zeros() };
+            let load = Wrench { force_n: Vector3::zeros(), torque_nm: Vector3::zeros() };
             let (dt_s, count) = (1e-3, 20_000);
             let squares = (0..count).map(|i| {
                 let p_wt = Point3::new(speed_m_s * dt_s * f64::from(i), 0.0, 0.0);
-                sensor.read(&effect, &load, &p_wt, dt_s).force_n.x.powi(2)
+                sensor.read(&effect, &load, &p_wt, is_touching, dt_s).force_n.x.powi(2)
             });
             (squares.sum::<f64>() / f64::from(count)).sqrt()
         };
-        let rest_n = noise_n(0.0, 1.0);
-        for (speed_m_s, load_n, expected) in
-            [(0.07, 1.0, 1.98), (0.14, 1.0, 2.96), (0.14, 0.0, 1.0)]
+        let rest_n = noise_n(0.0, true);
+        for (speed_m_s, touches, expected) in
+            [(0.07, true, 1.98), (0.14, true, 2.96), (0.14, false, 1.0)]
         {
-            let found = noise_n(speed_m_s, load_n) / rest_n;
-            assert!((found - expected).abs() < 0.05, "{speed_m_s} {load_n}: {found}");
+            let found = noise_n(speed_m_s, touches) / rest_n;
+            assert!((found - expected).abs() < 0.05, "{speed_m_s} {touches}: {found}");
         }
     }
 }
