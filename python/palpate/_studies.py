@@ -213,9 +213,9 @@ def identify(
     folder = Path(library)
     if not folder.is_dir() and (HOME / folder).is_dir():
         folder = HOME / folder
-    if (scene is None) == (contacts is None):
-        raise ValueError("scene, contacts: allowed is one of them")
     if contacts is not None:
+        if scene is not None:
+            raise ValueError("scene, contacts: allowed is one of them")
         if not 0 <= offset_max_m <= 0.1:
             raise ValueError(f"offset_max_m = {offset_max_m}: allowed is 0 to 0.1")
         source = _contacts(contacts)
@@ -223,6 +223,8 @@ def identify(
             os.fspath(folder), source, unit=unit, offset_max_m=offset_max_m, sure=sure
         )
         return IdentifyResult._of(json.loads(found))
+    if scene is None:
+        raise ValueError("scene, contacts: one of them is needed")
     path = find_file(scene, "scenes")
     touches, trial = _within("touches", touches, 1, 500), _within("trial", trial, 0, 2**32 - 2)
     with Progress(path.stem, progress, "touches") as look:

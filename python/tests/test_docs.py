@@ -38,6 +38,7 @@ PAGES = {
     "docs/many-runs.md": "many_runs",
     "docs/python.md": "guide",
     "docs/questions.md": "questions",
+    "docs/real-touches.md": "real_touches",
     "docs/your-planner.md": "my_planner",
     "python/README.md": "readme",
 }
