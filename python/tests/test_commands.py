@@ -55,6 +55,13 @@ RULES = [
     (r"palpate calibrate --band", "run", "--trials 1 --set touches=8", "fewer touches"),
     (r"palpate |export |mkdir ", "run", "", ""),
 ]
+#: Readings of a force/torque sensor under 10 N, with its z axis down, up, and along x and y of the base.
+POSES = """qx,qy,qz,qw,fx,fy,fz,tx,ty,tz
+0,0,0,1,0,0,-10,0,0,0
+1,0,0,0,0,0,10,0,0,0
+0,0.70710678,0,0.70710678,10,0,0,0,0,0
+0.70710678,0,0,0.70710678,0,-10,0,0,0,0
+"""
 #: A name that stands for another, which a command in a sentence may have.
 PLACEHOLDER = re.compile(r"…|\b(?:SCENE|FILE|NAME)\b")
 
@@ -96,11 +103,18 @@ def times():
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with the reader's own files, which the guides name: a mesh and planners."""
+    """A folder with the reader's own files, which the guides name: a mesh, planners, contacts, readings."""
     here = tmp_path / "empty"
     here.mkdir()
     vertices_m, triangles = palpate.read_mesh(palpate_home() / "models/suite/mug.glb")[:2]
     palpate.write_mesh(here / "my-part.stl", 1000 * vertices_m, triangles)
+    (here / "my-parts").mkdir()
+    palpate.write_mesh(here / "my-parts/mug.stl", 1000 * vertices_m, triangles)
+    touched = vertices_m[:: len(vertices_m) // 60]
+    rows = [f"{i // 3},{x},{y},{z}\n" for i, (x, y, z) in enumerate(touched.tolist())]
+    (here / "contacts.csv").write_text("group,x_m,y_m,z_m\n" + "".join(rows))
+    (here / "plate.csv").write_text((ROOT / "tests/real/panda_plane.csv").read_text())
+    (here / "poses.csv").write_text(POSES)
     pages = (ROOT / "docs/your-planner.md").read_text() + (ROOT / "docs/python.md").read_text()
     classes = re.findall(r"^class (?:Widest|Lucky).*\n(?:    .*\n)+", pages, flags=re.MULTILINE)
     (here / "my_planner.py").write_text("\n".join([*classes, "MyPlanner = Widest\n"]))
