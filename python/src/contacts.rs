@@ -130,7 +130,7 @@ pub(crate) fn identify_contacts(
     let values = json!({
         "object": name,
         "confidence": best.probability,
-        "is_sure": best.probability >= sure && best.errors.is_plausible(),
+        "is_sure": best.is_identified(sure),
         "touches": count,
         "probabilities": probabilities,
         "pose": {

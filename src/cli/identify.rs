@@ -11,7 +11,6 @@ use crate::sim::scene::Unit;
 use crate::study::identify::{self as study, IdentifySpec, RecordedSpec};
 use crate::study::run::start_arm;
 use anyhow::Context;
-use palpate_explore::recognition::RecordedObject;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -92,9 +91,7 @@ fn run_recorded(args: &Args, contacts: &Path, talk: Verbosity) -> anyhow::Result
         study::recorded(&spec)
     })?;
     print(&recorded(&found, log.contacts().len()))?;
-    let is_sure =
-        |best: &RecordedObject| best.probability >= args.sure && best.errors.is_plausible();
-    let is_sure = found.first().is_some_and(|(_, best)| is_sure(best));
+    let is_sure = found.first().is_some_and(|(_, best)| best.is_identified(args.sure));
     Ok(if is_sure { Completion::Done } else { Completion::Undecided })
 }
 

@@ -3,11 +3,9 @@
 use super::belief::picture;
 use super::html::{figure, page, section, tables};
 use super::points::PointCloud;
-use super::style;
+use super::solid::SurfaceFrame;
 use super::table::{Column, Table};
 use crate::study::fit::{FitResult, HeldOut};
-use nalgebra::{Point3, Vector3};
-use palpate_geometry::primitives::normal;
 use palpate_input::format::counted;
 
 /// Cells along the longest side of the mesh of a whole object.
@@ -122,32 +120,13 @@ pub fn mesh(fit: &FitResult, name: &str) -> Option<PointCloud> {
             (shape.points_w, shape.triangles, shape.sds_m)
         }
     };
-    let largest_m = sds_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let colour = |sd_m: f64| style::deviation_rgb(sd_m / largest_m);
-    let normals = vertex_normals(&vertices, &triangles);
-    Some(PointCloud {
-        comments: vec![
-            format!("Palpate {}: surface fitted to {name}", env!("CARGO_PKG_VERSION")),
-            "metres in the frame of the file".into(),
-            "sigma_m: standard deviation of the surface along its normal".into(),
-        ],
-        points: vertices.into_iter().zip(normals).collect(),
-        deviations: sds_m.into_iter().map(|sd_m| (sd_m, colour(sd_m))).collect(),
-        triangles: triangles.iter().map(|corners| corners.map(|it| it as usize)).collect(),
-        ..PointCloud::default()
-    })
-}
-
-/// Returns unit normals of vertices: those of their faces, by area.
-fn vertex_normals(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<f64>> {
-    let mut sums = vec![Vector3::zeros(); vertices.len()];
-    for corners in triangles {
-        let [a, b, c] = corners.map(|it| vertices[it as usize]);
-        let area = 0.5 * (b - a).cross(&(c - a)).norm();
-        let face = normal(&[a, b, c]) * area;
-        corners.iter().for_each(|it| sums[*it as usize] += face);
-    }
-    sums.iter().map(|sum| sum.try_normalize(1e-12).unwrap_or_else(Vector3::z)).collect()
+    let frame =
+        SurfaceFrame { mesh: (vertices, triangles), sd_m: sds_m, ..SurfaceFrame::default() };
+    Some(frame.points(vec![
+        format!("Palpate {}: surface fitted to {name}", env!("CARGO_PKG_VERSION")),
+        "metres in the frame of the file".into(),
+        "sigma_m: standard deviation of the surface along its normal".into(),
+    ]))
 }
 
 /// Returns the page as HTML.

@@ -30,51 +30,31 @@ pub struct FitSpec<'a> {
     pub heights: Option<HeightAxis>,
 }
 
-/// Axis of a file along which heights rise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeightAxis {
-    /// x.
-    X,
-    /// y.
-    Y,
-    /// z.
-    Z,
-    /// −x.
-    MinusX,
-    /// −y.
-    MinusY,
-    /// −z.
-    MinusZ,
+/// Axis of a file along which heights rise, read from its name.
+#[derive(Clone, Copy, Debug)]
+pub struct HeightAxis {
+    /// Rotation about the fixed axes x, then y, then z, deg, that turns y into it.
+    rotation_deg: [f64; 3],
 }
 
-impl HeightAxis {
-    /// Rotation about the fixed axes x, then y, then z, deg, that turns y into it.
-    fn rotation_deg(self) -> [f64; 3] {
-        match self {
-            Self::X => [0.0, 0.0, -90.0],
-            Self::Y => [0.0; 3],
-            Self::Z => [90.0, 0.0, 0.0],
-            Self::MinusX => [0.0, 0.0, 90.0],
-            Self::MinusY => [180.0, 0.0, 0.0],
-            Self::MinusZ => [-90.0, 0.0, 0.0],
-        }
-    }
-}
+/// Axes by name, with their rotations.
+const AXES: [(&str, [f64; 3]); 6] = [
+    ("x", [0.0, 0.0, -90.0]),
+    ("y", [0.0; 3]),
+    ("z", [90.0, 0.0, 0.0]),
+    ("-x", [0.0, 0.0, 90.0]),
+    ("-y", [180.0, 0.0, 0.0]),
+    ("-z", [-90.0, 0.0, 0.0]),
+];
 
 impl FromStr for HeightAxis {
     type Err = String;
 
-    /// Reads its name: x, y, z, -x, -y or -z.
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "x" => Ok(Self::X),
-            "y" => Ok(Self::Y),
-            "z" => Ok(Self::Z),
-            "-x" => Ok(Self::MinusX),
-            "-y" => Ok(Self::MinusY),
-            "-z" => Ok(Self::MinusZ),
-            _ => Err("allowed are x, y, z, -x, -y and -z".into()),
-        }
+        let found = AXES.iter().find(|(name, _)| *name == text);
+        found
+            .map(|(_, rotation_deg)| Self { rotation_deg: *rotation_deg })
+            .ok_or_else(|| "allowed are x, y, z, -x, -y and -z".into())
     }
 }
 
@@ -271,8 +251,8 @@ impl Model {
 
     /// Returns the model of a height field along an axis of the file.
     fn over(axis: HeightAxis, contacts: &[&Contact], has_normals: bool) -> Self {
-        let rotation_deg = axis.rotation_deg();
-        let zone = Zone { rotation_deg, ..Zone::new([0.0, 1.0], Some([0.0, 1.0])) };
+        let zone =
+            Zone { rotation_deg: axis.rotation_deg, ..Zone::new([0.0, 1.0], Some([0.0, 1.0])) };
         let points: Vec<Point3<f64>> =
             contacts.iter().map(|it| zone.x_wz().inverse_transform_point(&it.p_wc)).collect();
         let side = |axis: usize| {

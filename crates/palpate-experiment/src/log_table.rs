@@ -200,7 +200,7 @@ impl LogTable {
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
-            .from_reader(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+            .from_reader(files::without_bom(bytes));
         let names = reader.headers().map_err(wrong)?.iter().map(str::to_owned).collect();
         let rows = reader.records().map(|record| {
             let record = record.map_err(wrong)?;

@@ -13,6 +13,10 @@ use serde::{Deserialize, Serialize};
 // heuristic: between the first two, and the spread.
 pub const COMMON_ERROR_M: LogNormal = LogNormal { median: 2e-4, spread: 10.0 };
 
+/// Bounds of that error, as fractions of the signal's standard deviation.
+// heuristic: from a ten-thousandth, which no contact shows, to as much as the surface.
+pub const COMMON_RANGE: [f64; 2] = [1e-4, 1.0];
+
 /// Settings of the Gaussian process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]

@@ -3,7 +3,7 @@
 use super::mean_grid::MeanGrid;
 use crate::evidence::{Contact, End, FreeVolume};
 use crate::free_space::FreeSpaceBound;
-use crate::gp_settings::{Band, BandName, COMMON_ERROR_M, GpSettings};
+use crate::gp_settings::{Band, BandName, COMMON_ERROR_M, COMMON_RANGE, GpSettings};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
@@ -19,6 +19,7 @@ use palpate_gp::posterior::{Posterior, Scratch};
 use palpate_gp::{
     Hyperparameters, KnownError, Observation, Observations, Range, SearchBox, TouchNoise,
 };
+use palpate_input::config::is_default;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
@@ -27,10 +28,6 @@ use std::sync::OnceLock;
 /// the camera's pose.
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
-
-/// Bounds of an error in common of unknown size, as fractions of the signal's standard deviation.
-// heuristic: from a ten-thousandth, which no contact shows, to as much as the surface.
-const COMMON_RANGE: [f64; 2] = [1e-4, 1.0];
 
 /// Height of a contact above a seen element at its place, m, and in standard deviations of the
 /// element, beyond which the element is behind the front.
@@ -59,7 +56,7 @@ pub struct HeightField {
     #[serde(default)]
     pub(super) patches: Observations,
     /// Number of postures, whose contacts have errors in common of a size that is learned.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub(super) postures: usize,
     /// Contacts to which views are registered.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -88,10 +85,6 @@ pub struct HeightField {
     /// Mean of `surface` under the finger's hull, once it is asked for.
     #[serde(skip)]
     pub(super) reach: OnceLock<MeanGrid>,
-}
-
-fn is_none(count: &usize) -> bool {
-    *count == 0
 }
 
 /// Selection in place of that of a stored belief.

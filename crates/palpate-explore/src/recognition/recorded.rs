@@ -4,7 +4,9 @@
 //! touch by touch, it takes all contacts at once, from a robot that is not modelled.
 
 use super::library::Library;
-use super::measurement::{ContactErrors, ContactSet, Measurement, NoiseModel, TouchMeasurement};
+use super::measurement::{
+    ContactErrors, ContactSet, Measurement, NoiseModel, TouchMeasurement, log_sum_exp,
+};
 use super::model::Model;
 use super::object_posterior::{ObjectPosterior, Search};
 use super::particles::Particles;
@@ -40,6 +42,13 @@ pub struct RecordedObject {
     pub errors: ContactErrors,
 }
 
+impl RecordedObject {
+    /// Whether the object has the probability `sure`, and the contacts may be of it.
+    pub fn is_identified(&self, sure: f64) -> bool {
+        self.probability >= sure && self.errors.is_plausible()
+    }
+}
+
 /// Returns the objects of `library`, the most likely first, given `contacts` and `free` volumes in
 /// the same frame `W`, in which the object may be anywhere, at any rotation; empty without
 /// contacts. `seed` draws the poses.
@@ -71,34 +80,31 @@ pub fn recognise(
     let mut found: Vec<(RecordedObject, f64)> = (numbered.par_iter())
         .map(|(number, object)| {
             let model = Model { object, prior: &prior, evidence: &evidence, noise: NOISE };
-            let random = seed::stream(seed, *number as u64, "recorded");
-            let (found, log_evidence) = posterior(&model, &set, random);
-            (RecordedObject { object: *number, ..found }, log_evidence)
+            let particles = posterior(&model, seed::stream(seed, *number as u64, "recorded"));
+            let x_wo = particles.likeliest(&model).unwrap_or_default();
+            let log_evidence = particles.log_evidence - object.bvh.mesh().area_m2().ln();
+            let found = RecordedObject {
+                object: *number,
+                probability: 0.0,
+                x_wo,
+                distance_95_m: particles.central(object).1,
+                errors: set.errors(object, &x_wo),
+            };
+            (found, log_evidence)
         })
         .collect();
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let best = found.first().map_or(0.0, |first| first.1);
-    let sum: f64 = found.iter().map(|(_, log)| (log - best).exp()).sum();
-    let share = |log: f64| (log - best).exp() / sum;
+    let sum = log_sum_exp(&found.iter().map(|(_, log)| *log).collect::<Vec<_>>());
+    let share = |log: f64| (log - sum).exp();
     found.into_iter().map(|(it, log)| RecordedObject { probability: share(log), ..it }).collect()
 }
 
-/// Returns what the evidence tells about one object, and the logarithm of its evidence.
-fn posterior(model: &Model, set: &ContactSet, mut random: ChaCha8Rng) -> (RecordedObject, f64) {
+/// Draws poses of an object by the evidence, also those that particles from the prior miss.
+fn posterior(model: &Model, mut random: ChaCha8Rng) -> Particles {
     let mut particles = Particles::new(&Model { evidence: &[], ..*model }, POSES, &mut random);
     particles.update(model, POSES, &mut random);
     let best = particles.log_evidence;
     let mut posterior = ObjectPosterior::new(particles, random);
     posterior.revise(model, &Search { guesses: &[], best, is_wide: true, wanted: POSES });
-    let particles = &posterior.particles;
-    let x_wo = particles.likeliest(model).unwrap_or_default();
-    let (_, distance_95_m) = particles.central(model.object);
-    let found = RecordedObject {
-        object: 0,
-        probability: 0.0,
-        errors: set.errors(model.object, &x_wo),
-        x_wo,
-        distance_95_m,
-    };
-    (found, particles.log_evidence - model.object.bvh.mesh().area_m2().ln())
+    posterior.particles
 }

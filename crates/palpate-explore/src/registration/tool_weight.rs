@@ -133,13 +133,19 @@ mod tests {
                 rms: [0.0; 2],
                 largest_n: 0.0,
             };
+            // Two quarter turns, so that any others leave the weight determined.
+            let turns = [[0.0, 0.0, 0.0], [1.6, 0.0, 0.0], [0.0, 1.6, 0.0]].into_iter().chain(turns);
             let rotations: Vec<_> =
-                turns.iter().map(|turn| UnitQuaternion::from_scaled_axis(Vector3::from(*turn))).collect();
+                turns.map(|turn| UnitQuaternion::from_scaled_axis(Vector3::from(turn))).collect();
             let readings: Vec<_> = rotations.iter().map(|r_ws| (*r_ws, weight.reading(r_ws))).collect();
-            let Ok(found) = ToolWeight::fit(&readings) else { return Ok(()) };
+            let found = ToolWeight::fit(&readings).unwrap();
             prop_assert!((found.gravity_w_n - weight.gravity_w_n).norm() < 1e-6);
             prop_assert!((found.centre_m - weight.centre_m).norm() < 1e-6);
             prop_assert!(found.rms[0] < 1e-6 && found.rms[1] < 1e-6);
+            let other = UnitQuaternion::from_euler_angles(0.3, -2.0, 1.0);
+            let [here, there] = [&found, &weight].map(|weight| weight.reading(&other));
+            prop_assert!((here.force_n - there.force_n).norm() < 1e-6);
+            prop_assert!((here.torque_nm - there.torque_nm).norm() < 1e-6);
         }
     }
 

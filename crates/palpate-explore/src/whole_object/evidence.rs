@@ -118,13 +118,13 @@ impl SpatialEvidence {
             self.points.iter().filter(|points| points.source == Some(ErrorSource::Stroke));
         let postures =
             self.points.iter().filter(|points| points.source == Some(ErrorSource::Posture));
-        match () {
-            () if !self.seen.is_empty() || strokes.any(states) => CommonError::Stated,
-            () => match postures.count() {
-                0 => CommonError::None,
-                1 => CommonError::Assumed,
-                _ => CommonError::Learned,
-            },
+        if !self.seen.is_empty() || strokes.any(states) {
+            return CommonError::Stated;
+        }
+        match postures.count() {
+            0 => CommonError::None,
+            1 => CommonError::Assumed,
+            _ => CommonError::Learned,
         }
     }
 

@@ -8,7 +8,7 @@ use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::evidence::{End, Evidence, Outcome};
-use crate::gp_settings::COMMON_ERROR_M;
+use crate::gp_settings::{COMMON_ERROR_M, COMMON_RANGE};
 use crate::task::{Aim, Ball, Target};
 use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -51,10 +51,6 @@ fn default_kernel() -> &'static dyn Kernel {
 /// and the object fills a part of the ball.
 const SIGNAL: f64 = 0.5;
 const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];
-
-/// Bounds of an error in common of unknown size, as fractions of the signal's standard deviation.
-// heuristic: from a ten-thousandth, which no contact shows, to as much as the object.
-const COMMON_RANGE: [f64; 2] = [1e-4, 1.0];
 
 /// Computational budget of a fit in cubed matrix sizes, with at least [`TRIED_MIN`] factorisations;
 /// a heuristic: some ten milliseconds.

@@ -11,7 +11,7 @@
 //! skin and mesh are the same there. So each counts by wᵢ = 1 / Σⱼ exp(−|xᵢ − xⱼ|² / 2ℓ²), a
 //! composite likelihood (Varin, Reid & Firth 2011).
 
-use super::likelihood::{LogLikelihood, NoiseModel, Residual, log_sum_exp};
+use super::likelihood::{LogLikelihood, NoiseModel, PointFit, Residual, log_sum_exp};
 use super::touch::{LEVER_M, turn_between};
 use crate::evidence::Contact;
 use crate::recognition::library::{LibraryObject, Nearest};
@@ -47,14 +47,6 @@ pub struct ContactSet {
     /// Different deviations that contacts state, m; 0 without a statement.
     stated_m: Vec<f64>,
     offsets_m: Vec<f64>,
-}
-
-/// Residuals of a recorded contact.
-#[derive(Clone, Debug)]
-pub struct RecordedFit {
-    distance: Residual,
-    /// Rotation vector from the object's normal to the measured one, and the object's normal.
-    turn: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
 /// Errors of contacts, as learned from them.
@@ -113,18 +105,18 @@ impl ContactSet {
     }
 
     /// Returns the residuals for `object` at the pose `x_wo`.
-    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> Vec<RecordedFit> {
+    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> Vec<PointFit> {
         let fit = |point: &RecordedPoint| {
             let (distance, Nearest { face_w, .. }) = Residual::of_point(object, x_wo, &point.p_w);
             let turn = point.normal_w.map(|to_w| (turn_between(&face_w, &to_w), face_w));
-            RecordedFit { distance, turn }
+            PointFit { distance, turn }
         };
         self.points.iter().map(fit).collect()
     }
 
     /// Returns the log-likelihood of the distances for each deviation and offset, at the
     /// temperature `tau_m`.
-    fn log_likelihoods(&self, fit: &[RecordedFit], tau_m: f64) -> Vec<f64> {
+    fn log_likelihoods(&self, fit: &[PointFit], tau_m: f64) -> Vec<f64> {
         // Σ w, Σ w r and Σ w r² of each stated deviation are enough for all of them.
         let mut sums = vec![[0.0; 3]; self.stated_m.len()];
         for (RecordedPoint { weight, stated, .. }, fit) in self.points.iter().zip(fit) {
@@ -141,13 +133,18 @@ impl ContactSet {
                 });
             each.sum()
         };
-        let grid = variances(tau_m)
-            .flat_map(|variance| self.offsets_m.iter().map(move |offset_m| (variance, *offset_m)));
-        grid.map(|(variance, offset_m)| log(variance, offset_m)).collect()
+        self.grid(tau_m).map(|(variance, offset_m)| log(variance, offset_m)).collect()
+    }
+
+    /// Returns the variances, m², with each offset, m, at a temperature.
+    fn grid(&self, tau_m: f64) -> impl Iterator<Item = (f64, f64)> {
+        let offsets_m = &self.offsets_m;
+        variances(tau_m)
+            .flat_map(move |variance| offsets_m.iter().map(move |offset_m| (variance, *offset_m)))
     }
 
     /// Adds the log-likelihood ratio of residuals at the temperature `tau_m`.
-    pub fn add(&self, fit: &[RecordedFit], noise: &NoiseModel, tau_m: f64, to: &mut LogLikelihood) {
+    pub fn add(&self, fit: &[PointFit], noise: &NoiseModel, tau_m: f64, to: &mut LogLikelihood) {
         let logs = self.log_likelihoods(fit, tau_m);
         let sum = log_sum_exp(&logs);
         to.value += sum - (logs.len() as f64).ln();
@@ -181,13 +178,10 @@ impl ContactSet {
         let fit = self.fit(object, x_wo);
         let logs = self.log_likelihoods(&fit, 0.0);
         let sum = log_sum_exp(&logs);
-        let grid = variances(0.0).flat_map(|variance| {
-            self.offsets_m.iter().map(move |offset_m| [variance.sqrt(), *offset_m])
-        });
         let [mut sd_m, mut offset_m] = [0.0; 2];
-        for ([of_sd_m, of_offset_m], log) in grid.zip(&logs) {
+        for ((variance, of_offset_m), log) in self.grid(0.0).zip(&logs) {
             let share = (log - sum).exp();
-            sd_m += share * of_sd_m;
+            sd_m += share * variance.sqrt();
             offset_m += share * of_offset_m;
         }
         let far_m: f64 = fit.iter().map(|fit| fit.distance.value_m.abs()).sum();

@@ -69,6 +69,14 @@ impl Residual {
     }
 }
 
+/// Residuals of a point of contact.
+#[derive(Clone, Debug)]
+pub struct PointFit {
+    pub distance: Residual,
+    /// Rotation vector from the object's normal to the measured one, and the object's normal.
+    pub turn: Option<(Vector3<f64>, Vector3<f64>)>,
+}
+
 /// Sum of log-likelihood ratios with its derivatives by the pose.
 pub struct LogLikelihood {
     pub value: f64,

@@ -11,8 +11,7 @@ pub use touch::{LEVER_M, TouchMeasurement, before_m, hull};
 pub use view::ViewMeasurement;
 
 use super::library::LibraryObject;
-use contacts::RecordedFit;
-use likelihood::Residual;
+use likelihood::{PointFit, Residual};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 use touch::TouchFit;
@@ -31,7 +30,7 @@ pub enum Measurement {
 #[derive(Clone, Debug)]
 pub enum MeasurementFit {
     /// Those of recorded contacts.
-    Contacts(Vec<RecordedFit>),
+    Contacts(Vec<PointFit>),
     /// Those of a touch.
     Touch(TouchFit),
     /// Distances of the points of a view.

@@ -11,7 +11,7 @@
 //! the object before. For a miss L = 2 (1 − ε) exp(−g²/2σ²) + ε. A temperature τ adds to both
 //! deviations, so that at a large one all poses are equal.
 
-use super::likelihood::{LogLikelihood, NoiseModel, Residual, Terms, inflation};
+use super::likelihood::{LogLikelihood, NoiseModel, PointFit, Residual, Terms, inflation};
 use crate::evidence::{Contact, End, FreeVolume, Outcome};
 use crate::recognition::library::{LibraryObject, Nearest};
 use crate::robot::Finger;
@@ -69,13 +69,6 @@ pub struct TouchFit {
     /// Depth by which the hull would have met the object before it did, m, along the normal.
     depth: Residual,
     points: Vec<PointFit>,
-}
-
-#[derive(Clone, Debug)]
-struct PointFit {
-    distance: Residual,
-    /// Rotation vector from the object's normal to the measured one, and the object's normal.
-    turn: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl TouchMeasurement {
