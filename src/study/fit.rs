@@ -5,7 +5,7 @@ use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, Deviation, HeightField};
 use palpate_explore::evidence::{Contact, ErrorSource, Evidence, SurfacePoints};
-use palpate_explore::gp_settings::{GpSettings, Kernels, Priors};
+use palpate_explore::gp_settings::{GpSettings, Kernels};
 use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::TipSurface;
 use palpate_explore::task::touch::TouchSettings;
@@ -14,10 +14,9 @@ use palpate_explore::whole_object::settings::PriorShape;
 use palpate_explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::extent;
+use palpate_gp::MeanModel;
 use palpate_gp::math::normal::{BAND_95, band_factor};
-use palpate_gp::{LogNormal, MeanModel};
 use rayon::prelude::*;
-use std::f64::consts::E;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -237,14 +236,21 @@ impl Model {
         let task = Task::new(ball, TouchSettings::default(), &finger)?;
         let scope = ExplorationSetup::new(ball, &task, &TipSurface::Rigid);
         let has_free = spec.log.touches.iter().any(|touch| touch.free.is_some());
-        let is_shown = has_normals || has_free;
-        let settings = SpatialGpSettings {
+        let shown = SpatialGpSettings {
             // heuristic: up to twice the signal, because a hand errs by a part of its object.
             noise: [1e-3, 2.0],
-            prior: if is_shown { PriorShape::Ellipsoid } else { PriorShape::Distance },
-            priors: if is_shown { Priors::default() } else { contacts_alone() },
             sd_inflation: 1.0,
             ..SpatialGpSettings::default()
+        };
+        let settings = match has_normals || has_free {
+            true => shown,
+            // heuristic: a contact shows the surface in its own direction, at least.
+            false => SpatialGpSettings {
+                kernel: "matern_32".into(),
+                prior: PriorShape::Star,
+                length_scale: [0.3, 2.5],
+                ..shown
+            },
         };
         Ok(Self::Ball { scope, settings })
     }
@@ -310,15 +316,6 @@ impl Model {
             Self::Zone { zone, .. } => -zone.ahead_w().into_inner(),
         }
     }
-}
-
-/// Returns the priors of a surface of which only contacts are known: they lie on any smooth surface
-/// through or past them.
-// heuristics: a surface that departs from an ellipsoid by a fifth of its radius, over two thirds of
-// it, and contacts that err by a seventh of that.
-fn contacts_alone() -> Priors {
-    let prior = |median, spread| Some(LogNormal { median, spread });
-    Priors { length_scale: prior(0.7, E), noise: prior(0.15, 1.5), signal: prior(0.2, E) }
 }
 
 /// Returns the evidence of touches: the contacts of a group have an error in common. Where a normal

@@ -6,6 +6,7 @@ use palpate::experiment::contact_log::ContactLog;
 use palpate::study::fit::{FitSpec, run};
 use palpate_explore::evidence::Contact;
 use palpate_explore::recognition::{Library, LibraryObject, recognise};
+use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::low_discrepancy::over_surface;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::solids::{box_mesh, sphere_mesh};
@@ -103,14 +104,17 @@ proptest! {
     }
 }
 
-/// Returns `count` contacts of an ellipsoid, in groups of four that are off by up to `off_m`.
-fn ellipsoid_log(count: usize, off_m: f64) -> String {
+fn ellipsoid() -> Mesh {
     let (vertices, triangles) = sphere_mesh(Point3::origin(), 1.0, 24);
     let stretched: Vec<_> =
         vertices.iter().map(|p| Point3::new(0.06 * p.x, 0.04 * p.y, 0.03 * p.z)).collect();
-    let mesh = Mesh::new(&stretched, &triangles).unwrap().0;
+    Mesh::new(&stretched, &triangles).unwrap().0
+}
+
+/// Returns `count` contacts of a mesh, in groups of four that are off by up to `off_m`.
+fn log_of(mesh: &Mesh, count: usize, off_m: f64) -> String {
     let mut text = "group,x_m,y_m,z_m\n".to_owned();
-    for (i, at) in over_surface(&mesh, count).iter().enumerate() {
+    for (i, at) in over_surface(mesh, count).iter().enumerate() {
         let turn = (i / 4) as f64;
         let off = off_m * Vector3::new(turn.sin(), (2.0 * turn).cos(), (3.0 * turn).sin());
         let p = at.point + off;
@@ -122,7 +126,7 @@ fn ellipsoid_log(count: usize, off_m: f64) -> String {
 /// Contacts without normals give the surface, and held-out groups lie in the band.
 #[test]
 fn a_surface_is_fitted_to_contacts_alone() {
-    let log = read(&ellipsoid_log(80, 0.0)).unwrap();
+    let log = read(&log_of(&ellipsoid(), 80, 0.0)).unwrap();
     let spec = FitSpec { log: &log, heights: None };
     let fit = run(&spec, &AtomicBool::new(false), &|_, _| {}).unwrap().unwrap();
     let (rms_m, coverage) = (fit.rms_m().unwrap(), fit.coverage().unwrap());
@@ -134,10 +138,28 @@ fn a_surface_is_fitted_to_contacts_alone() {
     assert_eq!(fit.belief.to_json().unwrap(), twice.belief.to_json().unwrap());
 }
 
+/// The surface of a box through contacts alone is closed, and near to the box on all sides.
+#[test]
+fn a_box_of_contacts_alone_is_closed() {
+    let (vertices, triangles) = box_mesh([-0.05, -0.03, -0.02], [0.05, 0.03, 0.02]);
+    let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
+    let log = read(&log_of(&mesh, 60, 0.0)).unwrap();
+    let spec = FitSpec { log: &log, heights: None };
+    let fit = run(&spec, &AtomicBool::new(false), &|_, _| {}).unwrap().unwrap();
+    let found = fit.belief.implicit_surface().unwrap().surface().unwrap().mesh(40).unwrap();
+    let (_, report) = Mesh::new(found.vertices(), found.triangles()).unwrap();
+    assert!(report.is_closed(), "{report}");
+    let bvh = MeshBvh::new(found);
+    let places = over_surface(&mesh, 500);
+    let squares = places.iter().map(|at| bvh.closest_point(&at.point).distance_m.powi(2));
+    let rms_m = (squares.sum::<f64>() / places.len() as f64).sqrt();
+    assert!(rms_m < 3e-3, "{rms_m}");
+}
+
 /// Groups that are off by millimetres widen the band as much.
 #[test]
 fn errors_of_groups_widen_the_band() {
-    let log = read(&ellipsoid_log(80, 4e-3)).unwrap();
+    let log = read(&log_of(&ellipsoid(), 80, 4e-3)).unwrap();
     let spec = FitSpec { log: &log, heights: None };
     let fit = run(&spec, &AtomicBool::new(false), &|_, _| {}).unwrap().unwrap();
     let coverage = fit.coverage().unwrap();
@@ -225,7 +247,7 @@ fn an_object_is_recognised_by_contacts_of_unknown_error() {
 #[test]
 fn the_commands_fit_and_identify() {
     let folder = TempDir::new().unwrap();
-    let log = file(&folder, "egg.csv", &ellipsoid_log(48, 0.0));
+    let log = file(&folder, "egg.csv", &log_of(&ellipsoid(), 48, 0.0));
     let out = folder.path().join("egg");
     let words = |path: &Path| path.display().to_string();
     let text = succeeds(folder.path(), &["fit", &words(&log), "--out", &words(&out)]);

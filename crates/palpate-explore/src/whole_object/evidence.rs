@@ -172,7 +172,7 @@ impl SpatialEvidence {
                 let gradient = normal_w - field.gradient;
                 let slope = (normals && *has_normal)
                     .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
-                let place = p_w.coords.as_slice();
+                let place = &prior.coordinates(p_w);
                 let common = [sd_m.unwrap_or(0.0)];
                 let moved = if *has_normal { *normal_w } else { field.gradient };
                 let loadings = match is_posture {
@@ -182,6 +182,7 @@ impl SpatialEvidence {
                 let known = loadings.map(|loadings| KnownError { variance: 0.0, source, loadings });
                 let noise = sd_m.filter(|_| !is_stroke);
                 let noise = noise.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
+                let place = place.as_slice();
                 all.push(&Observation { place, height: -field.value, noise, slope, known });
             }
             source += usize::from(points.source.is_some());
@@ -200,7 +201,7 @@ impl SpatialEvidence {
             let least_m = radius_m.min(nearest_m);
             let sd_m = ((nearest_m - least_m) / 12f64.sqrt()).max(SURE * nearest_m);
             all.push(&Observation {
-                place: p_w.coords.as_slice(),
+                place: prior.coordinates(&p_w).as_slice(),
                 height: nearest_m - prior.field(&p_w).value,
                 noise: (sd_m / noise_m).max(1.0),
                 slope: None,
@@ -226,7 +227,8 @@ impl SpatialEvidence {
             let known = Some(KnownError { variance: element.sd * element.sd, source, loadings });
             let mut push = |p_w: &Point3<f64>, field_m: f64, noise: f64| {
                 let height = field_m - prior.field(p_w).value;
-                let place = p_w.coords.as_slice();
+                let place = &prior.coordinates(p_w);
+                let place = place.as_slice();
                 all.push(&Observation { place, height, noise, slope: None, known });
             };
             push(&element.p_w, 0.0, 1.0);
@@ -252,13 +254,14 @@ impl SpatialEvidence {
 // heuristic: near enough to be before the same part of the surface.
 const BEFORE: f64 = 0.1;
 
-/// Prior mean of the field over space.
+/// Prior mean of the field, and the coordinates over which the Gaussian process beyond it is
+/// stationary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorMean {
     /// Centre in `W` and half axes along those of `W`; `None` for a field of zeros.
     body: Option<(Point3<f64>, Vector3<f64>)>,
-    /// Whether the field is a distance to first order.
-    is_distance: bool,
+    /// Whether those coordinates are the direction from the centre, instead of the place.
+    is_star: bool,
 }
 
 /// Shortest half axis as a fraction of the ball's radius, so that contacts in one plane still span
@@ -284,43 +287,119 @@ impl PriorMean {
     pub fn about<'a>(
         shape: PriorShape,
         ball: &Ball,
-        points: impl Iterator<Item = &'a Point3<f64>>,
+        points: impl Iterator<Item = &'a Point3<f64>> + Clone,
     ) -> Self {
         let unknown = || (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m));
-        let (centre_w, radii_m) = half_axes_m(ball, points).unwrap_or_else(unknown);
+        let spanned = || half_axes_m(ball, points.clone()).unwrap_or_else(unknown);
         let body = match shape {
-            PriorShape::Ellipsoid | PriorShape::Distance => Some((centre_w, radii_m)),
-            PriorShape::Sphere => Some((centre_w, Vector3::repeat(radii_m.product().cbrt()))),
+            PriorShape::Ellipsoid => Some(spanned()),
+            PriorShape::Sphere => {
+                let (centre_w, radii_m) = spanned();
+                Some((centre_w, Vector3::repeat(radii_m.product().cbrt())))
+            }
             PriorShape::None => None,
+            PriorShape::Star => Some(spread(ball, points).unwrap_or_else(unknown)),
         };
-        Self { body, is_distance: shape == PriorShape::Distance }
+        Self { body, is_star: shape == PriorShape::Star }
     }
 
-    /// Returns the field at `p_w`, negative inside, with its gradient: h = s·(|v / r|² − 1) / 2 for
-    /// the offset v from the centre, the half axes r and the smallest of them s. It is infinitely
-    /// smooth, so that the residual of the Gaussian process is no rougher than the object.
-    ///
-    /// The distance to first order is h / √(|∇h|² + m²) (Taubin 1991), with m = 2 min(h, 0) / s so
-    /// that it is −s / 2 at the centre, where ∇h is 0.
+    /// Returns the field at `p_w`, negative inside, with its gradient, for the offset v from the
+    /// centre and the half axes r: h = s·(|v / r|² − 1) / 2 with the smallest of them s, which is
+    /// infinitely smooth, so that the residual of the Gaussian process is no rougher than the
+    /// object. For a star h = s·(|v / r| − 1) with their geometric mean s, which is linear along
+    /// rays from the centre.
     pub fn field(&self, p_w: &Point3<f64>) -> Field {
         let Some((centre_w, radii_m)) = &self.body else {
             return Field { value: 0.0, gradient: Vector3::zeros() };
         };
         let scaled = (p_w - centre_w).component_div(radii_m);
-        let least_m = radii_m.min();
-        let value = 0.5 * least_m * (scaled.norm_squared() - 1.0);
-        let gradient = scaled.component_div(radii_m) * least_m;
-        if !self.is_distance {
-            return Field { value, gradient };
+        if self.is_star {
+            let (size_m, reach) = (radii_m.product().cbrt(), scaled.norm());
+            let outward = scaled.try_normalize(0.0).unwrap_or_default();
+            let gradient = outward.component_div(radii_m) * size_m;
+            return Field { value: size_m * (reach - 1.0), gradient };
         }
-        let inside = 2.0 * value.min(0.0) / least_m;
-        let steepness = gradient.norm().hypot(inside);
-        // The second derivative of h is diagonal: s / r².
-        let by_gradient = gradient.component_div(radii_m).component_div(radii_m) * least_m;
-        let slope = (by_gradient + gradient * (2.0 * inside / least_m)) / steepness;
+        let least_m = radii_m.min();
         Field {
-            value: value / steepness,
-            gradient: gradient / steepness - slope * (value / (steepness * steepness)),
+            value: 0.5 * least_m * (scaled.norm_squared() - 1.0),
+            gradient: scaled.component_div(radii_m) * least_m,
+        }
+    }
+
+    /// Returns the coordinates of `p_w`: its place, or the direction d = (v / r) / |v / r|.
+    pub fn coordinates(&self, p_w: &Point3<f64>) -> Vector3<f64> {
+        match &self.body {
+            Some((centre_w, radii_m)) if self.is_star => {
+                let scaled = (p_w - centre_w).component_div(radii_m);
+                scaled.try_normalize(0.0).unwrap_or_default()
+            }
+            _ => p_w.coords,
+        }
+    }
+
+    /// Returns the gradient over space at `p_w` of a function with this gradient over the
+    /// coordinates: (g − d (d·g)) / |v / r| / r for a direction.
+    pub fn gradient(&self, p_w: &Point3<f64>, over_coordinates: Vector3<f64>) -> Vector3<f64> {
+        match &self.body {
+            Some((centre_w, radii_m)) if self.is_star => {
+                let scaled = (p_w - centre_w).component_div(radii_m);
+                let Some(outward) = scaled.try_normalize(0.0) else { return Vector3::zeros() };
+                let across = over_coordinates - outward * outward.dot(&over_coordinates);
+                across.component_div(radii_m) / scaled.norm()
+            }
+            _ => over_coordinates,
+        }
+    }
+}
+
+/// Returns centre and half axes of the ellipsoid whose uniformly touched surface has the mean and
+/// the relative deviations of `points`, as large as they are on average; `None` unless two differ.
+fn spread<'a>(
+    ball: &Ball,
+    points: impl Iterator<Item = &'a Point3<f64>> + Clone,
+) -> Option<(Point3<f64>, Vector3<f64>)> {
+    extent(points.clone()).filter(|[low, high]| low != high)?;
+    let count = points.clone().count() as f64;
+    let mean = points.clone().map(|p_w| p_w.coords).sum::<Vector3<f64>>() / count;
+    let squares = points.clone().map(|p_w| (p_w.coords - mean).map(|x| x * x));
+    let radii_m = (squares.sum::<Vector3<f64>>() * (3.0 / count)).map(f64::sqrt);
+    let radii_m = radii_m.map(|radius_m| radius_m.max(THINNEST * ball.radius_m));
+    let reaches = points.map(|p_w| (p_w.coords - mean).component_div(&radii_m).norm());
+    Some((mean.into(), radii_m * (reaches.sum::<f64>() / count)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_geometry::low_discrepancy::directions;
+
+    /// The coordinates of a star are the same along a ray from its centre, its field is linear
+    /// there, and the gradient of a function of the direction is that of finite differences.
+    #[test]
+    fn a_star_depends_on_the_direction() {
+        let points = directions(40).map(|d| Point3::new(0.3 + 0.06 * d.x, 0.04 * d.y, 0.1 * d.z));
+        let points: Vec<Point3<f64>> = points.collect();
+        let ball = Ball { centre_w: Point3::origin(), radius_m: 0.2, lowest_m: None };
+        let star = PriorMean::about(PriorShape::Star, &ball, points.iter());
+        let Some((centre_w, radii_m)) = star.body else { panic!() };
+        let expected = Vector3::new(0.06, 0.04, 0.1);
+        assert!((radii_m - expected).amax() < 2e-3, "{radii_m}");
+        for p_w in &points {
+            assert!(star.field(p_w).value.abs() < 3e-3);
+            let along = |t: f64| centre_w + (p_w - centre_w) * t;
+            assert!((star.coordinates(&along(0.4)) - star.coordinates(&along(2.0))).amax() < 1e-12);
+            let values = [1.0, 2.0, 3.0].map(|t| star.field(&along(t)).value);
+            assert!((values[2] - 2.0 * values[1] + values[0]).abs() < 1e-12);
+            let of = |place: &Vector3<f64>| 2.0 * place.x * place.y - 0.7 * place.z;
+            let over = star.coordinates(p_w);
+            let over = Vector3::new(2.0 * over.y, 2.0 * over.x, -0.7);
+            let found = star.gradient(p_w, over);
+            for axis in 0..3 {
+                let step = Vector3::ith(axis, 1e-7);
+                let ends = [p_w + step, p_w - step].map(|p_w| of(&star.coordinates(&p_w)));
+                let slope = (ends[0] - ends[1]) / 2e-7;
+                assert!((found[axis] - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{axis}");
+            }
         }
     }
 }

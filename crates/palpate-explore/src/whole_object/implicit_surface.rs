@@ -5,7 +5,7 @@ use super::evidence::{
     CameraPose, CommonError, ObservationModel, PriorMean, SpatialEvidence, half_axes_m,
 };
 use super::scope::ExplorationSetup;
-use super::settings::SpatialGpSettings;
+use super::settings::{PriorShape, SpatialGpSettings};
 use super::surface::Surface;
 use crate::evidence::{End, Evidence, Outcome};
 use crate::gp_settings::{COMMON_ERROR_M, COMMON_RANGE};
@@ -323,11 +323,14 @@ impl ImplicitSurface {
     ) -> Result<Fit, CovarianceError> {
         let ball = self.estimated_ball();
         let radius_m = ball.radius_m;
-        let extents = self.log_extents(&ball);
+        let (unit, extents) = match self.settings.prior {
+            PriorShape::Star => (1.0, [0.0; 3]),
+            _ => (radius_m, self.log_extents(&ball)),
+        };
         let lengths_m =
             |exponent: f64, length_m: f64| extents.map(|log| length_m * (exponent * log).exp());
         let SpatialGpSettings { length_scale, noise, slope_noise, .. } = &self.settings;
-        let mut ranges = vec![length_scale.map(|share| share * radius_m), *noise];
+        let mut ranges = vec![length_scale.map(|share| share * unit), *noise];
         ranges.extend(self.normals().then_some(*slope_noise));
         // Errors of known size do not grow with the signal, which is then searched too.
         let signals_m = SIGNAL_RANGE.map(|share| share * radius_m);
@@ -366,8 +369,7 @@ impl ImplicitSurface {
         let signal_sd = match common {
             CommonError::Stated => SignalModel::Searched,
             CommonError::None | CommonError::Learned | CommonError::Assumed => {
-                let prior = self.settings.priors.signal.map(|prior| prior.scaled(radius_m));
-                SignalModel::Profiled(Range { low: signals_m[0], high: signals_m[1], prior })
+                SignalModel::Profiled(Range { low: signals_m[0], high: signals_m[1], prior: None })
             }
         };
         let parameters = |logs: &[f64]| parameters(logs, common);
@@ -382,14 +384,9 @@ impl ImplicitSurface {
             let (exponent, length_m, ratio) = parameters(logs);
             let lengths_m = lengths_m(exponent, length_m);
             let found = likelihood.profile(&lengths_m, ratio, &signal_sd, None)?;
-            let priors = [
-                (self.settings.priors.length_scale, length_m / radius_m),
-                (self.settings.priors.noise, ratio.height),
-                (is_learned.then_some(COMMON_ERROR_M), ratio.known * found.signal_sd),
-            ];
-            let prior =
-                priors.iter().filter_map(|(prior, at)| Some((*prior)?.log_density(at.ln())));
-            let value = prior.fold(found.log_likelihood, |sum, log| sum + log);
+            let common_m = ratio.known * found.signal_sd;
+            let prior = is_learned.then(|| COMMON_ERROR_M.log_density(common_m.ln()));
+            let value = found.log_likelihood + prior.unwrap_or(0.0);
             Ok::<_, CovarianceError>((value, found.signal_sd))
         })?;
         let (exponent, length_m, ratio) = parameters(&found.x);

@@ -1,7 +1,6 @@
 //! Settings of the Gaussian process over space.
 
-use crate::gp_settings::Priors;
-use palpate_input::config::{Rules, Validate, is_default};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,12 +20,6 @@ pub struct SpatialGpSettings {
     /// Bounds of the normals' noise, in units of the field's standard deviation over the length
     /// scale.
     pub slope_noise: [f64; 2],
-    /// Log-normal priors of the length scales' mean, of the noise and of the signal, the latter as
-    /// a fraction of the radius of the ball around the contacts; flat if omitted. Set by a fit to
-    /// recorded contacts.
-    #[serde(skip_serializing_if = "is_default")]
-    #[schemars(skip)]
-    pub priors: Priors,
     /// Whether contact normals are observed, as gradients of the field; requires the kernel
     /// `matern_52`.
     pub normals: bool,
@@ -52,12 +45,14 @@ pub enum PriorShape {
     /// The ellipsoid inscribed in the contacts' box.
     #[default]
     Ellipsoid,
-    /// Distance of that ellipsoid, to first order, where only contacts are known.
-    Distance,
     /// A sphere about the centre of that box, as large as the ellipsoid.
     Sphere,
     /// Zero: far from all touches, points are neither inside nor outside.
     None,
+    /// An ellipsoid about the contacts' mean, from which the surface departs by a function of the
+    /// direction alone: a star-shaped body, of which only contacts are known. Not for planners.
+    #[schemars(skip)]
+    Star,
 }
 
 /// Supported kernels; a squared exponential makes the surface fold.
@@ -72,7 +67,6 @@ impl Default for SpatialGpSettings {
             prior: PriorShape::Ellipsoid,
             length_scale: [0.1, 4.0],
             noise: [1e-3, 0.1],
-            priors: Priors::default(),
             slope_noise: [0.01, 1.0],
             normals: true,
             free_space_samples: 3,
@@ -87,10 +81,12 @@ impl Default for SpatialGpSettings {
 impl Validate for SpatialGpSettings {
     fn check(&self, rules: &mut Rules) {
         rules.one_of("kernel", &self.kernel, &KERNELS);
+        rules.require("prior", "\"star\"", self.prior != PriorShape::Star, || {
+            "ellipsoid, sphere, none".into()
+        });
         rules.interval("length_scale", self.length_scale, 1e-2..=100.0);
         rules.interval("noise", self.noise, 1e-6..=10.0);
         rules.interval("slope_noise", self.slope_noise, 1e-6..=100.0);
-        self.priors.check("priors", rules);
         rules.number("free_space_samples", self.free_space_samples.into(), 0.0..=16.0);
         rules.number("sd_inflation", self.sd_inflation, 0.1..=10.0);
         rules.optional_number("offset_m", self.offset_m, 0.0..=0.1);

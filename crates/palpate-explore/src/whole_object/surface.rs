@@ -91,20 +91,22 @@ impl Surface {
 
     /// Returns the mean at `p_w`, m: negative inside.
     pub fn value(&self, p_w: &Point3<f64>) -> f64 {
-        self.prior.field(p_w).value + self.mean.value(p_w.coords.as_slice())
+        self.prior.field(p_w).value + self.mean.value(self.prior.coordinates(p_w).as_slice())
     }
 
     /// Returns the mean at `p_w` with its gradient.
     pub fn field(&self, p_w: &Point3<f64>) -> Field {
         let mut gradient = [0.0; 3];
-        let value = self.mean.gradient(p_w.coords.as_slice(), &mut gradient);
-        self.prior.field(p_w) + Field { value, gradient: gradient.into() }
+        let value = self.mean.gradient(self.prior.coordinates(p_w).as_slice(), &mut gradient);
+        let gradient = self.prior.gradient(p_w, gradient.into());
+        self.prior.field(p_w) + Field { value, gradient }
     }
 
     /// Returns [`value`](Self::value) at each of `points_w`.
     pub fn values(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
         let values = points_w.par_chunks(CHUNK).map(|points_w| {
-            let mut values = self.mean.values(&places(points_w), &mut []);
+            let places = self.places(points_w);
+            let mut values = self.mean.values(&slices(&places), &mut []);
             let prior = points_w.iter().map(|p_w| self.prior.field(p_w).value);
             values.iter_mut().zip(prior).for_each(|(value, prior)| *value += prior);
             values
@@ -116,22 +118,32 @@ impl Surface {
     pub fn fields(&self, points_w: &[Point3<f64>]) -> Vec<Field> {
         let fields = points_w.par_chunks(CHUNK).map(|points_w| {
             let mut gradients = vec![0.0; 3 * points_w.len()];
-            let values = self.mean.values(&places(points_w), &mut gradients);
-            let means = values.into_iter().zip(gradients.as_chunks::<3>().0);
-            let means = means.map(|(value, slope)| Field { value, gradient: (*slope).into() });
-            means.zip(points_w).map(|(mean, p_w)| self.prior.field(p_w) + mean).collect::<Vec<_>>()
+            let places = self.places(points_w);
+            let values = self.mean.values(&slices(&places), &mut gradients);
+            let means = values.into_iter().zip(gradients.as_chunks::<3>().0).zip(points_w);
+            let fields = means.map(|((value, slope), p_w)| {
+                let gradient = self.prior.gradient(p_w, (*slope).into());
+                self.prior.field(p_w) + Field { value, gradient }
+            });
+            fields.collect::<Vec<_>>()
         });
         fields.flatten_iter().collect()
     }
 
+    /// Returns the coordinates of points in the Gaussian process.
+    fn places(&self, points_w: &[Point3<f64>]) -> Vec<Vector3<f64>> {
+        points_w.iter().map(|p_w| self.prior.coordinates(p_w)).collect()
+    }
+
     /// Standard deviation of the field at each of `points_w`, m.
     pub fn sds_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
+        let coordinates = self.places(points_w);
         let places: Vec<Vec<f64>> =
-            points_w.iter().map(|p_w| p_w.coords.as_slice().into()).collect();
+            coordinates.iter().map(|place| place.as_slice().into()).collect();
         let variances = places.par_chunks(CHUNK);
         let variances = variances.map(|places| self.posterior.variances(places, &mut []));
         let mut variances: Vec<f64> = variances.flatten_iter().collect();
-        let places: Vec<&[f64]> = places.iter().map(Vec::as_slice).collect();
+        let places = slices(&coordinates);
         for error in &self.pose_errors {
             let values = error.values(&places, &mut []).into_iter();
             variances
@@ -146,8 +158,8 @@ impl Surface {
     /// Returns the covariances of the field at each of `a_w` with each of `b_w`, m²: one row for
     /// each of `a_w`. Errors of cameras' poses and of all contacts are common to all points.
     pub fn covariances_m2(&self, a_w: &[Point3<f64>], b_w: &[Point3<f64>]) -> Vec<Vec<f64>> {
-        let [a, b] = [a_w, b_w]
-            .map(|points_w| points_w.iter().map(|p_w| p_w.coords.as_slice()).collect::<Vec<_>>());
+        let [a, b] = [a_w, b_w].map(|points_w| self.places(points_w));
+        let [a, b] = [slices(&a), slices(&b)];
         let mut rows = VarianceReduction::new(&self.posterior, b.iter().copied()).covariances(&a);
         let offset2 = self.offset_m * self.offset_m;
         rows.iter_mut().flatten().for_each(|covariance| *covariance += offset2);
@@ -280,7 +292,7 @@ fn thinned(
     points.iter().skip(first(step)).step_by(step).copied().collect()
 }
 
-/// Returns points as places of a Gaussian process.
-fn places(points_w: &[Point3<f64>]) -> Vec<&[f64]> {
-    points_w.iter().map(|p_w| p_w.coords.as_slice()).collect()
+/// Returns coordinates as slices.
+fn slices(places: &[Vector3<f64>]) -> Vec<&[f64]> {
+    places.iter().map(|place| place.as_slice()).collect()
 }

@@ -9,7 +9,7 @@ use rand::Rng;
 use std::f64::consts::TAU;
 
 /// Pressure per count of PDC (SynTouch BioTac SP manual).
-const PDC_PA: f64 = 36.5;
+pub const PDC_PA: f64 = 36.5;
 
 /// Pressure per count of PAC (SynTouch BioTac SP manual).
 const PAC_PA: f64 = 0.37;
