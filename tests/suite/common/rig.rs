@@ -346,6 +346,10 @@ pub fn patient() -> RigSettings {
     let topics = &mut settings.topics;
     (topics.joints.max_age_s, topics.wrench.max_age_s, topics.tactile.max_age_s) = (0.4, 0.4, 0.4);
     (topics.status.max_age_s, topics.command.max_age_s) = (1.0, 0.3);
-    let interlocks = InterlockSettings { wrench_timeout_s: 0.5, ..InterlockSettings::default() };
+    let interlocks = InterlockSettings {
+        joint_timeout_s: 0.2,
+        wrench_timeout_s: 0.5,
+        ..InterlockSettings::default()
+    };
     RigSettings { ros: settings, interlocks }
 }
