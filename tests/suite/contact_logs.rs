@@ -68,6 +68,13 @@ fn a_covariance_is_read() {
     assert!((log.contacts()[0].sd_m().unwrap() - 2e-3).abs() < 1e-12);
 }
 
+/// Without a normal, the deviation is the mean over all directions.
+#[test]
+fn a_covariance_without_a_normal_counts_in_every_direction() {
+    let log = read("x,y,z,cov_xx,cov_xy,cov_xz,cov_yy,cov_yz,cov_zz\n0,0,0,7e-6,0,0,4e-6,0,1e-6\n");
+    assert!((log.unwrap().contacts()[0].sd_m().unwrap() - 2e-3).abs() < 1e-12);
+}
+
 /// Errors name line, column and what is allowed.
 #[test]
 fn errors_name_line_and_column() {

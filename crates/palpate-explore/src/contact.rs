@@ -47,10 +47,13 @@ impl Contact {
         Self { covariance_w, ..self }
     }
 
-    /// Standard deviation of the surface along the normal, m, if the sensor states it.
+    /// Standard deviation of the surface along the normal, m, if the sensor states it; in the mean
+    /// over all directions where no normal is known.
     pub fn sd_m(&self) -> Option<f64> {
-        let variance =
-            |covariance_w: &Matrix3<f64>| self.normal_w.dot(&(covariance_w * self.normal_w));
+        let variance = |covariance_w: &Matrix3<f64>| match self.has_normal {
+            true => self.normal_w.dot(&(covariance_w * self.normal_w)),
+            false => covariance_w.trace() / 3.0,
+        };
         self.covariance_w.as_ref().map(|covariance_w| variance(covariance_w).max(0.0).sqrt())
     }
 }
