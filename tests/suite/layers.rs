@@ -32,7 +32,7 @@ const LAYERS: [(&str, &[&[&str]]); 8] = [
         "palpate_experiment",
         &[
             &["metrics", "planner_names", "backend_settings"],
-            &["row"],
+            &["row", "stop"],
             &["measure"],
             &["report_settings"],
             &["experiment"],

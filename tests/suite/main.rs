@@ -130,6 +130,7 @@ mod shell_accuracy;
 mod shell_elements;
 mod shell_reference;
 mod solid;
+mod stop;
 mod strokes;
 mod sweeps;
 mod toml_files;

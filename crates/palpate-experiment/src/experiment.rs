@@ -10,6 +10,7 @@ use crate::metrics::truth::scan_truth::ScanTruth;
 use crate::planner_names::{self, ORACLE};
 use crate::report_settings::{ReportSettings, TOUCHES_MAX};
 use crate::row::TrialId;
+use crate::stop::StopSettings;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
@@ -48,6 +49,9 @@ pub struct Experiment {
     pub initial_touches: u32,
     /// Touches per trial, initial ones included.
     pub touches: u32,
+    /// Earlier ends of trials.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub stop: StopSettings,
     /// Views of the scene's camera before the touches.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub views: u32,
@@ -124,6 +128,7 @@ impl Experiment {
             seed: 0,
             initial_touches: 5.min(touches),
             touches,
+            stop: StopSettings::default(),
             views: 0,
             further_views: 0,
             verification_touches: 0,
@@ -446,6 +451,21 @@ impl Validate for Experiment {
         rules.require("seed", self.seed, self.seed <= i64::MAX as u64, || {
             format!("0 to {}", i64::MAX)
         });
+        rules.table("stop", &self.stop);
+        if let Some(rmse_m) = self.stop.rmse_m {
+            let is_calibrated = self.scene.zone.is_some() && self.gp.band.learned().is_some();
+            rules.require("stop.rmse_m", rmse_m, is_calibrated, || {
+                "a scene with a [zone], and a band whose claims hold: gp.band = \"objects\", or a \
+                 learned one"
+                    .into()
+            });
+        }
+        if let Some(least) = self.stop.object_probability {
+            let has_library = self.scene.library.is_some();
+            rules.require("stop.object_probability", least, has_library, || {
+                "a scene with a [library]".into()
+            });
+        }
         rules.table("gp", &self.gp);
         rules.table("space", &self.space);
         self.check_whole_object(rules);

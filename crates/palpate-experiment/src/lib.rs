@@ -38,6 +38,7 @@ pub mod runner;
 pub mod scan;
 pub mod simulation;
 pub mod statistics;
+pub mod stop;
 pub mod store;
 pub mod sweep;
 pub mod trial;

@@ -104,6 +104,8 @@ pub static MEASURES: &[Measure] = &[
         .from(Source::Trial(TrialRow::path_m))
         .drawn(PanelAxis::Linear),
     ROBOT_TIME,
+    STOP_TOUCHES,
+    RMSE_BOUND_HOLDS,
     VERIFICATION_RMSE,
     measure(Minimise, "verification_nlpd", "NLPD at verification touches", PLAIN)
         .from(Source::Trial(|row, n| nlpd(predicted(row, n)?.map(|(error, sd)| (error, sd * sd))))),
@@ -158,6 +160,21 @@ pub const REACHABLE_RMSE: Measure = measure(Minimise, "reachable_rmse_m", "RMSE,
 const UNREACHABLE_RMSE: Measure = measure(Minimise, "unreachable_rmse_m", "RMSE, unreachable", MM)
     .from(Source::Metrics(|it| it.unreachable_rmse_m))
     .aggregated(Aggregate::Median);
+
+/// Number of touches of a trial that stopped by its rule.
+pub const STOP_TOUCHES: Measure =
+    measure(Minimise, "stop_touches", "touches until the stop", PLAIN)
+        .from(Source::Trial(|row, n| {
+            let touches = row.touches.len();
+            (row.stopped && touches <= n as usize).then_some(touches as f64)
+        }))
+        .aggregated(Aggregate::Median);
+
+/// Share of trials whose RMSE within reach is at most the bound that the belief states.
+pub const RMSE_BOUND_HOLDS: Measure =
+    measure(Undirected, "rmse_bound_holds", "RMSE within its bound", SHARE).from(Source::Touch(
+        |it| Some(share(it.metrics.as_ref()?.reachable_rmse_m? <= it.rmse_bound_m?)),
+    ));
 
 /// Time of the simulated or real robot since the start of a trial.
 pub const ROBOT_TIME: Measure =
@@ -220,9 +237,10 @@ fn length_scale(touch: &TouchRow, axis: usize) -> Option<f64> {
     touch.fit.as_ref()?.hyperparameters.length_scales.get(axis).copied()
 }
 
-/// Verification touches of a trial; `None` unless the trial has `touches` touches.
+/// Verification touches of a trial, which follow its last touch; `None` after fewer touches.
 fn verification(row: &TrialRow, touches: u32) -> Option<&[VerificationRow]> {
-    (row.touches.len() == touches as usize).then_some(&row.verification)
+    let has_ended = row.stopped && row.ended_before(touches);
+    (has_ended || row.touches.len() == touches as usize).then_some(&row.verification)
 }
 
 /// Verification touches at new places.
@@ -418,8 +436,8 @@ impl Measure {
         self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
     }
 
-    /// Value after some touches; `None` if the trial has no value. A failed trial keeps the last
-    /// value before its failure.
+    /// Value after some touches; `None` if the trial has no value. A trial that failed or stopped
+    /// keeps its last value.
     pub fn value(&self, row: &TrialRow, touches: u32) -> Option<f64> {
         match self.source {
             Source::Trial(of) => of(row, touches),

@@ -34,6 +34,9 @@ pub struct TrialRow {
     /// Reason of an early end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
+    /// Whether `[stop]` ended it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub stopped: bool,
     /// Views of a camera.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<ViewRow>,
@@ -96,6 +99,9 @@ pub struct TouchRow {
     /// Jitter added to the covariance, relative to its diagonal; omitted if 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub jitter: f64,
+    /// Bound of the RMSE within reach (95 %); with `stop.rmse_m`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rmse_bound_m: Option<f64>,
     /// Errors of the belief after this touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metrics: Option<Metrics>,
@@ -153,7 +159,8 @@ impl TrialRow {
     /// Creates a trial without touches, with the `failure` that ended it, if given.
     pub fn without_touches(trial: u32, planner: &str, failure: Option<String>) -> Self {
         let (views, touches, verification) = Default::default();
-        Self { trial, planner: planner.into(), failure, views, touches, verification }
+        let planner = planner.into();
+        Self { trial, planner, failure, stopped: false, views, touches, verification }
     }
 
     /// Creates a trial that a fault ended before its first touch.
@@ -161,10 +168,10 @@ impl TrialRow {
         Self::without_touches(trial, planner, Some(format!("before the first touch: {fault}")))
     }
 
-    /// Whether the trial failed before this number of touches. Its last belief then counts to the
-    /// end.
+    /// Whether the trial failed, or stopped by its rule, before this number of touches. Its last
+    /// belief then counts to the end.
     pub fn ended_before(&self, touches: u32) -> bool {
-        self.failure.is_some() && self.touches.len() < touches as usize
+        (self.failure.is_some() || self.stopped) && self.touches.len() < touches as usize
     }
 
     /// Returns all actions up to touch `touches`, in order.
@@ -184,7 +191,7 @@ impl TrialRow {
 
     /// Travel of the finger over its first `touches` touches, along straight lines: between places
     /// of a zone; around an object between contacts, or the aimed points of touches without
-    /// contact. `None` for a trial with fewer touches that did not fail.
+    /// contact. `None` for a trial with fewer touches that has not ended.
     pub fn path_m(&self, touches: u32) -> Option<f64> {
         let made = match self.ended_before(touches) {
             true => &self.touches[..],
@@ -219,6 +226,7 @@ impl TouchRow {
             fallback: plan.fallback,
             fit: None,
             jitter: 0.0,
+            rmse_bound_m: None,
             metrics: None,
             silhouette: None,
             shape: None,

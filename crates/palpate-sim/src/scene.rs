@@ -170,8 +170,7 @@ pub struct ObjectSettings {
     /// Rotation about the fixed axes x, then y, then z of `W`.
     #[serde(default)]
     pub rotation_deg: [f64; 3],
-    /// Whether a flat patch without errors closes each hole of the mesh; `false` if the object has
-    /// the holes.
+    /// Whether a flat patch without errors closes each hole; `false` if the object has it.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub fill_holes: bool,
     /// Name of the analytic surface behind the mesh; errors are computed against it instead of the

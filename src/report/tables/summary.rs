@@ -1,12 +1,16 @@
 //! Curves of a run as tables for the page, the terminal and files; and the claims of a publication
 //! next to the results.
 
-use crate::experiment::measure::{self, MEASURES, Measure, RECOGNISED, VERIFICATION_RMSE};
+use crate::experiment::Experiment;
+use crate::experiment::measure::{
+    self, MEASURES, Measure, RECOGNISED, STOP_TOUCHES, VERIFICATION_RMSE,
+};
 use crate::experiment::row::{ViewRow, planner_rows};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
-use crate::experiment::statistics::{mean, mean_interval};
+use crate::experiment::statistics::{mean, mean_interval, median};
+use crate::experiment::stop::StopSettings;
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
 use palpate_explore::view::ViewDoubt;
@@ -218,8 +222,23 @@ pub fn event_lines(run: &Run) -> Vec<String> {
         let trials = counted(run.unlisted, "stored trial");
         format!("{trials} {verb} not shown: the experiment does not list them")
     });
-    let cameras = run.experiment.planners.iter().filter_map(|planner| camera_line(run, planner));
-    run.experiment.planners.iter().filter_map(of).chain(cameras).chain(unlisted).collect()
+    let planners = || run.experiment.planners.iter();
+    let cameras = planners().filter_map(|planner| camera_line(run, planner));
+    let stops = planners().filter_map(|planner| stop_line(run, planner));
+    planners().filter_map(of).chain(cameras).chain(stops).chain(unlisted).collect()
+}
+
+/// Returns how many trials of a planner stopped by their rule, and when; `None` without a rule.
+fn stop_line(run: &Run, planner: &str) -> Option<String> {
+    let Run { experiment: Experiment { stop, touches, .. }, rows, .. } = run;
+    let is_asked = *stop != StopSettings::default();
+    let ends = || planner_rows(rows, planner).map(|row| STOP_TOUCHES.value(row, *touches));
+    let stopped: Vec<f64> = ends().flatten().collect();
+    let after = median(&stopped).map_or(String::new(), |touches| {
+        format!(", after {} (median)", counted(touches.round() as usize, "touch"))
+    });
+    let trials = counted(ends().count(), "trial");
+    is_asked.then(|| format!("{planner}: {} of {trials} stopped by [stop]{after}", stopped.len()))
 }
 
 /// Error of a camera's pose, in prior standard deviations, beyond which something else is wrong.

@@ -70,8 +70,8 @@ pub fn run(text: &str) -> Run {
 fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
     let touches =
         (1..=experiment.touches).map(|count| touch(experiment, (trial, planner), count)).collect();
-    let (planner, failure) = (planner.into(), None);
-    TrialRow { trial, planner, failure, views: Vec::new(), touches, verification: Vec::new() }
+    let row = TrialRow::without_touches(trial, planner, None);
+    TrialRow { touches, ..row }
 }
 
 /// Outcome of a miss at `target`, with the position at which the finger turns back.
@@ -134,6 +134,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         fallback: None,
         fit: is_fitted.then_some(fit),
+        rmse_bound_m: None,
         jitter: 0.0,
         metrics: is_fitted.then_some(metrics),
     }

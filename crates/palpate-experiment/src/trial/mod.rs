@@ -173,6 +173,12 @@ fn run_touches(
         row.touches.push(touch_row);
         fitted.map_err(|error| format!("fit after touch {count}: {error}"))?;
         observed.map_err(|fault| failed(&fault))?;
+        let bound_m = row.touches.last().and_then(|touch| touch.rmse_bound_m);
+        row.stopped = count >= experiment.initial_touches
+            && experiment.stop.is_met(episode.belief(), bound_m);
+        if row.stopped {
+            break;
+        }
     }
     for (view, error) in row.views.iter_mut().zip(episode.belief().rigid_errors()) {
         view.error = Some(error);
@@ -272,6 +278,7 @@ fn evaluate(
     }
     fitted?;
     row.metrics = truth.truth.compare(belief.surface());
+    row.rmse_bound_m = experiment.stop.rmse_bound_m(belief);
     if let Some(surface) = belief.implicit_surface().filter(|_| experiment.is_evaluated(count)) {
         let evaluated = truth.shape.as_ref().zip(surface.surface());
         row.shape = evaluated.map(|(shape, it)| shape.evaluate(it, experiment.space.cells));

@@ -38,8 +38,7 @@ pub struct RecognitionSettings {
     /// finger 0.05.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outliers: Option<f64>,
-    /// Number of poses per object; where many objects of the library are possible, they share
-    /// 32 times as many.
+    /// Number of poses per object; many possible objects share 32 times as many.
     pub particles: u32,
 }
 

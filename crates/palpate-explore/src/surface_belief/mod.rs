@@ -1,9 +1,11 @@
 //! The trait of beliefs about a surface.
 
+mod error_bound;
 mod random_field;
 
 pub use random_field::{RandomField, Reduction};
 
+use self::error_bound::{BOUNDED_AT, correlations, rms_quantile};
 use crate::evidence::Outcome;
 use crate::surface_evidence::Silhouette;
 use crate::task::zone::grid_triangles;
@@ -15,6 +17,7 @@ use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::math::normal;
+use palpate_gp::reduction::VarianceReduction;
 use std::any::Any;
 
 /// A belief about the surface in a region, from the outcomes of actions.
@@ -112,6 +115,32 @@ pub trait SurfaceBelief: Any + Send + Sync {
             z.iter().map(|z| mean + z * sd_m).collect()
         });
         Some(HeightPredictions { quantiles_m: quantiles_m.collect(), variances })
+    }
+
+    /// Returns the root mean square error of the heights over a zone, m, that the belief is sure
+    /// with `probability` not to exceed where a finger reaches a surface. `None` around a whole
+    /// object and before the first fit.
+    fn rmse_bound_m(&self, probability: f64) -> Option<f64> {
+        let Region::Zone(_) = self.region() else { return None };
+        let places = self.references(BOUNDED_AT)?;
+        let heights = self.heights(&places, &[0.025, 0.5, 0.975])?;
+        let sds_m: Vec<f64> = (heights.quantiles_m.iter())
+            .map(|ends_m| {
+                let [below_m, above_m] = [ends_m[1] - ends_m[0], ends_m[2] - ends_m[1]];
+                (0.5 * (below_m * below_m + above_m * above_m)).sqrt() / normal::BAND_95
+            })
+            .collect();
+        let slices: Vec<&[f64]> = places.iter().map(Vec::as_slice).collect();
+        let weights = self.silhouette().probabilities(slices.iter().copied());
+        let correlations = match self.posterior() {
+            Some(posterior) => {
+                let references = VarianceReduction::new(posterior, slices.iter().copied());
+                correlations(references.covariances(&slices))
+            }
+            // Errors in common exceed a bound the most often.
+            None => vec![vec![1.0; places.len()]; places.len()],
+        };
+        Some(rms_quantile(&weights, &sds_m, &correlations, probability))
     }
 
     /// Returns the distance of `p_w` outside the believed surface, m, with the standard deviation
