@@ -64,7 +64,7 @@ mod tests {
         assert!((alike / 2.0 - 1.96).abs() < 0.03, "{alike}");
         // The square root of χ²_50 at 0.95, 67.50, over 50.
         assert!((apart / 2.0 - 1.162).abs() < 2e-3, "{apart}");
-        let half = vec![[0.0; 25], [1.0; 25]].concat();
+        let half = [[0.0; 25], [1.0; 25]].concat();
         assert!(rms_quantile(&half, &sds, &matrix(0.0), 0.95) > apart);
         assert_eq!(rms_quantile(&[0.0; 50], &sds, &matrix(0.0), 0.95), 0.0);
     }
