@@ -26,6 +26,7 @@ class ExperimentSettings(TypedDict, total=False):
     seed: int
     touches: int
     initial_touches: int
+    stop: Table
     verification_touches: int
     repeat_touches: int
     views: int
