@@ -143,6 +143,22 @@ fn joints_that_lag_by_less_than_is_allowed_trip_nothing() {
     }
 }
 
+/// An arm stops by itself while the next command is overdue, and moves less than commanded. Without
+/// a late command the same distance counts.
+#[test]
+fn a_late_command_after_which_the_arm_rested_trips_nothing() {
+    let ends = |breaks: Breaks| {
+        let site = site(stage(Point3::origin(), Finger::default().r_at()));
+        let world = FakeScene { breaks: Some((400, breaks)), ..FakeScene::real() };
+        let (mut body, _) = interlocks(&site, &InterlockSettings::default(), world);
+        let ahead = Command { qdot: vec![0.0, -0.2, 0.0] };
+        (0..800).find_map(|_| body.step(&ahead).err())
+    };
+    assert_eq!(ends(|_, reading| reading.time_s += 0.036), None);
+    let fault = ends(|_, reading| reading.q[1] += 0.2 * 0.032).unwrap().to_string();
+    assert!(fault.contains("position tracking error of Y"), "{fault}");
+}
+
 /// Bounds apply to the possible position of the tip, not only to the last observed one.
 #[test]
 fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {

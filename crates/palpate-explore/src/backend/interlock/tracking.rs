@@ -45,6 +45,7 @@ pub const POSITION: InterlockEntry = InterlockEntry {
             spans: STEPS_S.map(Span::new),
             recent: Recent::new(settings.tracking_lag_s, capabilities.period_s),
             commanded: Joints::zeros(),
+            overdue: Joints::zeros(),
             time_s: 0.0,
         };
         capabilities.real_time.then(|| Box::new(tracking) as _)
@@ -143,6 +144,7 @@ const SHARE: f64 = 0.05;
 struct Sample {
     time_s: f64,
     q: Joints,
+    overdue: Joints,
     commanded: [Joints; LAGS],
 }
 
@@ -232,6 +234,9 @@ struct Tracking {
     recent: Recent,
     /// Integral of the applied commands.
     commanded: Joints,
+    /// Integral of the applied speeds from the second tick without a command on: the robot may
+    /// stop by itself.
+    overdue: Joints,
     /// Time of the last reading.
     time_s: f64,
 }
@@ -247,8 +252,14 @@ impl Interlock for Tracking {
             return Ok(());
         }
         self.commanded += applied * passed_s;
+        self.overdue += applied.abs() * (passed_s - 2.0 * now.period_s).max(0.0);
         self.recent.push(self.commanded);
-        let sample = Sample { time_s: now.time_s, q: now.q, commanded: self.recent.commanded };
+        let sample = Sample {
+            time_s: now.time_s,
+            q: now.q,
+            overdue: self.overdue,
+            commanded: self.recent.commanded,
+        };
         for span in &mut self.spans {
             if !span.push(sample, now.period_s) {
                 continue;
@@ -257,7 +268,8 @@ impl Interlock for Tracking {
             for (i, joint) in now.chain.joints.iter().enumerate() {
                 let reach_m = now.reaches_m[i];
                 let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
-                let limit = FLOOR_M + SHARE * low[i].abs().max(high[i].abs()) * reach_m;
+                let overdue = sample.overdue[i] - span.start(&sample).overdue[i];
+                let limit = FLOOR_M + (SHARE * low[i].abs().max(high[i].abs()) + overdue) * reach_m;
                 if found > limit {
                     let behind =
                         sample.commanded[0][i] - span.start(&sample).commanded[0][i] - moved[i];
