@@ -68,6 +68,7 @@ mod installed;
 mod interlocks;
 mod keep_out;
 #[cfg(feature = "mujoco")]
+mod known_shapes;
 mod lab;
 mod lab_camera;
 #[cfg(feature = "mujoco")]

@@ -18,6 +18,7 @@ use palpate_explore::recognition::RecognitionSettings;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::arm::model::JointModel;
 use palpate_explore::whole_object::SpatialGpSettings;
+use palpate_explore::whole_object::settings::PriorShape;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use palpate_input::paths;
 use palpate_input::tables::{self, Mismatch};
@@ -349,6 +350,10 @@ impl Experiment {
     fn check_recognition(&self, rules: &mut Rules) {
         rules.table("recognition", &self.recognition);
         let has_library = self.scene.library.is_some();
+        let is_plain = self.space.prior != PriorShape::Library;
+        rules.require("gp.prior", "\"library\"", has_library || is_plain, || {
+            "ellipsoid, sphere, none, or a scene with a table [library]".into()
+        });
         for (i, name) in self.planners.iter().enumerate() {
             let needs = planner::by_name(name).is_some_and(|entry| entry.needs_library);
             rules.require(&format!("planners[{i}]"), name, has_library || !needs, || {

@@ -8,6 +8,7 @@ use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};
 use palpate_explore::planner::{Fallback, Plan};
+use palpate_explore::recognition::Likeness;
 use palpate_explore::task::Target;
 use palpate_explore::view::RigidError;
 use palpate_gp::fit::Fit;
@@ -56,6 +57,8 @@ pub struct Step<'a> {
     pub outcome: &'a Outcome,
     /// Fit after it, if there was one.
     pub fit: Option<&'a Fit>,
+    /// Shapes that the belief is about after it, with `gp.prior = "library"`.
+    pub likeness: Option<&'a Likeness>,
 }
 
 /// One view of a camera.
@@ -86,8 +89,7 @@ pub struct TouchRow {
     pub target: Target,
     /// Outcome of the touch, with its evidence.
     pub outcome: Outcome,
-    /// Posterior standard deviation at the target when planned, conditioned on unreached targets;
-    /// omitted if not computed.
+    /// Standard deviation at the target when planned, given unreached targets.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub planned_sd_m: Option<f64>,
     /// Reason why the planner used its fallback.
@@ -96,7 +98,10 @@ pub struct TouchRow {
     /// Fit after this touch; none before the last initial touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<Fit>,
-    /// Jitter added to the covariance, relative to its diagonal; omitted if 0.
+    /// Shapes that the belief is about.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likeness: Option<Likeness>,
+    /// Jitter of the covariance, relative to its diagonal.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub jitter: f64,
     /// Bound of the RMSE within reach (95 %); with `stop.rmse_m`.
@@ -183,9 +188,11 @@ impl TrialRow {
                 target,
                 outcome,
                 fit: fit.as_ref(),
+                likeness: None,
             });
-            let TouchRow { target, outcome, fit, .. } = touch;
-            views.chain([Step { target, outcome, fit: fit.as_ref() }])
+            let TouchRow { target, outcome, fit, likeness, .. } = touch;
+            let (fit, likeness) = (fit.as_ref(), likeness.as_ref());
+            views.chain([Step { target, outcome, fit, likeness }])
         })
     }
 
@@ -225,6 +232,7 @@ impl TouchRow {
             planned_sd_m: plan.sd_m,
             fallback: plan.fallback,
             fit: None,
+            likeness: None,
             jitter: 0.0,
             rmse_bound_m: None,
             metrics: None,

@@ -16,6 +16,7 @@ use palpate_explore::probe::Probe;
 use palpate_explore::probe::servo::Servo;
 use palpate_explore::recognition::Library;
 use palpate_explore::task::Task;
+use palpate_explore::whole_object::settings::PriorShape;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
 use palpate_sim::Environment;
@@ -103,10 +104,11 @@ impl Simulation {
             looks::check(&experiment, &environment)?;
         }
         let (library, object) = (Some(Arc::clone(library)), Some(object));
-        let mut made = Self::made(
-            experiment,
-            GroundTruth { environment, truth, shape: None, library, object },
-        )?;
+        // Sampled only where the object is reconstructed too.
+        let is_rebuilt = trial.is_some() && experiment.space.prior == PriorShape::Library;
+        let shape = is_rebuilt.then(|| TrueShape::from_environment(&environment)).flatten();
+        let mut made =
+            Self::made(experiment, GroundTruth { environment, truth, shape, library, object })?;
         // Each trial has its own.
         made.experiment.scene.object = None;
         Ok(made)

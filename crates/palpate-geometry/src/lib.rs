@@ -40,6 +40,7 @@ mod bounds;
 pub mod bvh;
 pub mod decimate;
 pub mod distance;
+pub mod distance_grid;
 pub mod holes;
 pub mod implicit;
 pub mod import;

@@ -119,6 +119,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
     };
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
+        likeness: None,
         silhouette: None,
         shape: None,
         recognition: None,

@@ -283,6 +283,7 @@ fn evaluate(
         let evaluated = truth.shape.as_ref().zip(surface.surface());
         row.shape = evaluated.map(|(shape, it)| shape.evaluate(it, experiment.space.cells));
     }
+    row.likeness = belief.likeness();
     row.jitter = belief.jitter();
     row.fit = belief.fit().cloned();
     Ok(())

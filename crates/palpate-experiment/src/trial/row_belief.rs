@@ -6,6 +6,7 @@ use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::task::Task;
 use palpate_explore::whole_object::{ExplorationSetup, ImplicitSurface};
 use palpate_input::error::InputError;
+use palpate_sim::library::LoadedLibrary;
 
 impl TrialRow {
     /// Returns the belief of the surface after `count` touches of a trial of `experiment`, with the
@@ -33,14 +34,22 @@ impl TrialRow {
                 return Err(InputError::new(message).at(place(number)));
             }
         }
+        let is_like = touches.iter().any(|touch| touch.likeness.is_some());
+        let settings = experiment.scene.library.as_ref().filter(|_| is_like);
+        let library = settings.map(LoadedLibrary::read).transpose()?.map(|it| it.known);
         let (mut before, mut steps) = (None, self.steps(count).peekable());
         while let Some(step) = steps.next() {
             belief.observe(step.target, step.outcome);
             // What a view shows depends on the belief at each fit; other evidence does not.
             let is_used = steps.peek().is_none() || !self.views.is_empty();
             if let Some(fit) = step.fit.filter(|_| is_used) {
-                belief
-                    .condition_on(before, fit)
+                let conditioned = match (step.likeness, &library) {
+                    (Some(likeness), Some(library)) => {
+                        belief.condition_like(likeness, library, fit)
+                    }
+                    _ => belief.condition_on(before, fit),
+                };
+                conditioned
                     .map_err(|error| InputError::new(error.to_string()).at(place(touches.len())))?;
             }
             before = step.fit.or(before);

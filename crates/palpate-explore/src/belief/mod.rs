@@ -16,8 +16,9 @@ pub use quantiles::BAND;
 
 use super::evidence::Outcome;
 use super::gp_settings::GpSettings;
-use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
-use crate::recognition::ObjectHypotheses;
+use super::whole_object::settings::PriorShape;
+use super::whole_object::{ExplorationSetup, ImplicitSurface, LibrarySurface, SpatialGpSettings};
+use crate::recognition::{Library, Likeness, ObjectHypotheses};
 use crate::robot::sensor::TipSurface;
 use crate::task::{Region, Target, Task};
 use palpate_gp::covariance::CovarianceError;
@@ -27,6 +28,10 @@ use palpate_input::format;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::ops::Deref;
+
+/// Number of shapes that the surface may be like.
+// heuristic: several poses of several objects; most that differ little are merged.
+const SHAPES: usize = 32;
 
 /// Belief of one trial: a belief of the surface, whose methods it has, and hypotheses about the
 /// object.
@@ -61,7 +66,11 @@ impl Belief {
             }
             Region::Ball(ball) => {
                 let scope = ExplorationSetup::new(*ball, task, surface);
-                ImplicitSurface::new(scope, space.clone()).into()
+                let surface = ImplicitSurface::new(scope, space.clone());
+                match space.prior {
+                    PriorShape::Library => LibrarySurface::new(surface).into(),
+                    _ => surface.into(),
+                }
             }
         }
     }
@@ -80,7 +89,15 @@ impl Belief {
     /// # Errors
     /// If the covariance of the evidence cannot be factored.
     pub fn refit(&mut self) -> Result<(), CovarianceError> {
+        if let Some(hypotheses) = self.hypotheses.as_ref().filter(|_| self.has_library_prior()) {
+            self.surface.resemble(hypotheses.shapes(SHAPES));
+        }
         self.surface.refit()
+    }
+
+    /// Whether shapes of the library are the prior of the surface.
+    fn has_library_prior(&self) -> bool {
+        (&*self.surface as &dyn Any).is::<LibrarySurface>()
     }
 
     /// Conditions the surface on all evidence with the hyperparameters of the last fit.
@@ -99,6 +116,23 @@ impl Belief {
     /// If the covariance of the evidence cannot be factored.
     pub fn condition_on(&mut self, before: Option<&Fit>, fit: &Fit) -> Result<(), CovarianceError> {
         self.surface.condition(before, fit)
+    }
+
+    /// Conditions the surface as [`condition_on`](Self::condition_on) does, about the shapes of
+    /// `library` that a recorded belief of a whole object was about.
+    ///
+    /// # Errors
+    /// If the covariance of the evidence cannot be factored.
+    pub fn condition_like(
+        &mut self,
+        likeness: &Likeness,
+        library: &Library,
+        fit: &Fit,
+    ) -> Result<(), CovarianceError> {
+        match (&mut *self.surface as &mut dyn Any).downcast_mut::<ImplicitSurface>() {
+            Some(surface) => surface.condition_like(likeness, library, fit),
+            None => self.surface.condition(None, fit),
+        }
     }
 
     /// Returns the evidence, the settings and the last fit as JSON.
@@ -180,6 +214,8 @@ impl dyn SurfaceBelief {
 
     /// Returns the belief of a whole object, if it is one.
     pub fn implicit_surface(&self) -> Option<&ImplicitSurface> {
-        (self as &dyn Any).downcast_ref()
+        let any = self as &dyn Any;
+        let like = any.downcast_ref().map(LibrarySurface::favoured);
+        like.or_else(|| any.downcast_ref())
     }
 }

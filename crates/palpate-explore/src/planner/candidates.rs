@@ -199,7 +199,7 @@ pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option
 fn fill_gap(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;
-    let is_known = scope.estimated_ball(belief.points().iter()).radius_m >= KNOWN * whole.radius_m;
+    let is_known = scope.ball_around(belief.points().iter()).radius_m >= KNOWN * whole.radius_m;
     if is_known || !belief.aims().len().is_multiple_of(EVERY) {
         return None;
     }

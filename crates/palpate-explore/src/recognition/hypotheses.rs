@@ -1,5 +1,6 @@
 //! Hypotheses about object and pose, and *none of these*.
 
+use super::known_shape::KnownShape;
 use super::library::{Library, LibraryObject};
 use super::measurement::{
     Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull, log_sum_exp,
@@ -412,6 +413,36 @@ impl ObjectHypotheses {
             .into_iter()
             .map(|i| Hypothesis { object: weighted[i].0, x_wo: *weighted[i].1 })
             .collect()
+    }
+
+    /// Returns `count` shapes that the object may be like, drawn evenly over the posterior: half of
+    /// them objects of the library, half of them near to one. The rest of their probability is that
+    /// of none of these before all touches.
+    pub fn shapes(&self, count: usize) -> Vec<KnownShape> {
+        [&self.objects, &self.near]
+            .into_iter()
+            .flat_map(|bank| self.drawn(bank, count / 2))
+            .collect()
+    }
+
+    /// Returns `count` shapes drawn from a bank of objects that were equally likely before.
+    fn drawn(&self, bank: &[ObjectPosterior], count: usize) -> Vec<KnownShape> {
+        let logs: Vec<f64> = bank.iter().map(|it| it.particles.log_evidence).collect();
+        let sum = log_sum_exp(&logs);
+        let weighted: Vec<_> = (bank.iter().zip(self.library.objects()).zip(&logs))
+            .flat_map(|((posterior, object), log)| {
+                let probability = (log - sum).exp();
+                let weighted = posterior.particles.weighted();
+                weighted.map(move |(x_wo, weight)| (object, x_wo, weight * probability))
+            })
+            .collect();
+        let drawn = systematic(weighted.iter().map(|it| it.2), count, 0.5).into_iter();
+        let probability = (1.0 - self.settings.none_probability) / (2 * count.max(1)) as f64;
+        let shape = |i: usize| {
+            let (object, x_wo, _) = weighted[i];
+            KnownShape::new(Arc::clone(object), *x_wo, probability, Arc::clone(&self.prior))
+        };
+        drawn.map(shape).collect()
     }
 
     /// Returns the pose of the most likely object.

@@ -2,16 +2,21 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_geometry::bvh::{MeshBvh, SweepHit};
+use palpate_geometry::distance_grid::DistanceGrid;
 use palpate_geometry::low_discrepancy::over_surface;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::normal;
 use palpate_geometry::sweep::Capsule;
 use palpate_input::error::InputError;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Number of points of a surface that pose errors and plans are computed from.
 // heuristic: about 5 mm apart on an object of the size of a mug.
 const SAMPLES: usize = 256;
+
+/// Cells of the grid of distances along the longest side.
+// heuristic: some millimetres on an object for a hand, less than objects of a kind differ.
+const CELLS: u32 = 36;
 
 /// An object whose shape is known.
 pub struct LibraryObject {
@@ -29,6 +34,7 @@ pub struct LibraryObject {
     pub samples: Vec<Point3<f64>>,
     /// Unit normals of the faces of `samples`.
     pub normals: Vec<Vector3<f64>>,
+    distances: OnceLock<DistanceGrid>,
 }
 
 impl LibraryObject {
@@ -42,7 +48,8 @@ impl LibraryObject {
             .map(|at| (at.point, normal(&bvh.mesh().corners(at.triangle as usize))))
             .unzip();
         let (name, stand_m) = (name.into(), (high.z - low.z) / 2.0);
-        Self { class: name.clone(), name, bvh, middle_m, stand_m, samples, normals }
+        let (class, distances) = (name.clone(), OnceLock::new());
+        Self { name, class, bvh, middle_m, stand_m, samples, normals, distances }
     }
 
     /// Sets the class.
@@ -59,6 +66,11 @@ impl LibraryObject {
     pub fn radius_m(&self) -> f64 {
         let vertices = self.bvh.mesh().vertices().iter();
         vertices.map(|vertex| vertex.coords.norm()).fold(0.0, f64::max)
+    }
+
+    /// Returns the distances from the surface, in `O`, sampled at the first call.
+    pub fn distances(&self) -> &DistanceGrid {
+        self.distances.get_or_init(|| DistanceGrid::new(&self.bvh, CELLS))
     }
 
     /// Returns the first contact, in `W`, of a capsule in `W` that travels along `ahead_w`, with

@@ -7,6 +7,7 @@
 #[cfg(test)]
 mod boxes;
 mod hypotheses;
+mod known_shape;
 mod library;
 mod measurement;
 mod model;
@@ -18,6 +19,7 @@ mod pose_prior;
 mod recorded;
 
 pub use hypotheses::{Hypothesis, ObjectHypotheses, PoseEstimate, Prediction, RecognitionSettings};
+pub use known_shape::{KnownShape, Likeness, Shown, StoredShape};
 pub use library::{Library, LibraryObject};
 pub use measurement::ContactErrors;
 pub use pose_prior::{PosePrior, Turn};

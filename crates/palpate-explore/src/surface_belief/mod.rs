@@ -7,6 +7,7 @@ pub use random_field::{RandomField, Reduction};
 
 use self::error_bound::{BOUNDED_AT, correlations, rms_quantile};
 use crate::evidence::Outcome;
+use crate::recognition::{KnownShape, Likeness};
 use crate::surface_evidence::Silhouette;
 use crate::task::zone::grid_triangles;
 use crate::task::{Region, Target, Zone};
@@ -31,6 +32,15 @@ pub trait SurfaceBelief: Any + Send + Sync {
     /// Adds what an action at `target` has shown; the belief changes at the next
     /// [`refit`](Self::refit).
     fn observe(&mut self, target: &Target, outcome: &Outcome);
+
+    /// Sets shapes that the object may be like; by default nothing, for a belief without a
+    /// library.
+    fn resemble(&mut self, _shapes: Vec<KnownShape>) {}
+
+    /// Returns the shapes that it is about; `None` for a belief without a library.
+    fn likeness(&self) -> Option<Likeness> {
+        None
+    }
 
     /// Fits the hyperparameters by maximum likelihood and conditions on all evidence.
     ///

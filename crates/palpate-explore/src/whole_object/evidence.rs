@@ -3,6 +3,7 @@
 
 use super::settings::PriorShape;
 use crate::evidence::{Contact, End, ErrorSource, Evidence, FreeVolume, SurfacePoints};
+use crate::recognition::{KnownShape, Shown};
 use crate::task::stroke::FIRST_SOURCE;
 use crate::task::{Aim, Ball};
 use crate::view::SeenSurface;
@@ -11,6 +12,7 @@ use palpate_geometry::implicit::Field;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
 use palpate_gp::{KnownError, Observation, Observations, Slope};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Evidence of all actions, by kind.
@@ -239,6 +241,25 @@ impl SpatialEvidence {
         }
     }
 
+    /// Returns `shapes` fitted to the contacts and to the free space inside `ball`.
+    pub(super) fn fitted(
+        &self,
+        shapes: &[KnownShape],
+        ball: &Ball,
+        places: u32,
+    ) -> Vec<KnownShape> {
+        let normal_w = |contact: &Contact| contact.has_normal.then_some(contact.normal_w);
+        let contacts_w: Vec<_> =
+            self.touched().map(|contact| (contact.p_wc, normal_w(contact))).collect();
+        let empty_w = self.free.iter().flat_map(|free| {
+            let places_w = free.places_w(ball, places);
+            places_w.map(|p_w| (p_w, free.finger.radius_m))
+        });
+        let empty_w: Vec<_> = empty_w.collect();
+        let shown = Shown { contacts_w: &contacts_w, empty_w: &empty_w };
+        shapes.par_iter().map(|shape| shape.fitted(&shown)).collect()
+    }
+
     /// Registers the views to the contacts, and leaves out what the touches contradict.
     pub(super) fn register(&mut self) {
         let free = &self.free;
@@ -256,12 +277,21 @@ const BEFORE: f64 = 0.1;
 
 /// Prior mean of the field, and the coordinates over which the Gaussian process beyond it is
 /// stationary.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PriorMean {
-    /// Centre in `W` and half axes along those of `W`; `None` for a field of zeros.
-    body: Option<(Point3<f64>, Vector3<f64>)>,
-    /// Whether those coordinates are the direction from the centre, instead of the place.
-    is_star: bool,
+#[derive(Clone)]
+pub enum PriorMean {
+    /// A field of zeros.
+    Zero,
+    /// A body around the contacts.
+    Body {
+        /// Its centre in `W`.
+        centre_w: Point3<f64>,
+        /// Its half axes along those of `W`.
+        radii_m: Vector3<f64>,
+        /// Whether the coordinates are the direction from the centre, instead of the place.
+        is_star: bool,
+    },
+    /// The mean of shapes that the object may be like.
+    Shapes(Vec<KnownShape>),
 }
 
 /// Shortest half axis as a fraction of the ball's radius, so that contacts in one plane still span
@@ -291,66 +321,90 @@ impl PriorMean {
     ) -> Self {
         let unknown = || (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m));
         let spanned = || half_axes_m(ball, points.clone()).unwrap_or_else(unknown);
-        let body = match shape {
-            PriorShape::Ellipsoid => Some(spanned()),
+        let body = |(centre_w, radii_m)| Self::Body { centre_w, radii_m, is_star: false };
+        match shape {
+            PriorShape::Ellipsoid | PriorShape::Library => body(spanned()),
             PriorShape::Sphere => {
                 let (centre_w, radii_m) = spanned();
-                Some((centre_w, Vector3::repeat(radii_m.product().cbrt())))
+                body((centre_w, Vector3::repeat(radii_m.product().cbrt())))
             }
-            PriorShape::None => None,
-            PriorShape::Star => Some(spread(ball, points).unwrap_or_else(unknown)),
-        };
-        Self { body, is_star: shape == PriorShape::Star }
+            PriorShape::None => Self::Zero,
+            PriorShape::Star => {
+                let (centre_w, radii_m) = spread(ball, points).unwrap_or_else(unknown);
+                Self::Body { centre_w, radii_m, is_star: true }
+            }
+        }
     }
 
-    /// Returns the field at `p_w`, negative inside, with its gradient, for the offset v from the
-    /// centre and the half axes r: h = s·(|v / r|² − 1) / 2 with the smallest of them s, which is
-    /// infinitely smooth, so that the residual of the Gaussian process is no rougher than the
-    /// object. For a star h = s·(|v / r| − 1) with their geometric mean s, which is linear along
-    /// rays from the centre.
+    /// Returns the field at `p_w`, negative inside, with its gradient. For a body with the offset v
+    /// from the centre and the half axes r it is h = s·(|v / r|² − 1) / 2 with the smallest of them
+    /// s, which is infinitely smooth, so that the residual of the Gaussian process is no rougher
+    /// than the object. For a star h = s·(|v / r| − 1) with their geometric mean s, which is linear
+    /// along rays from the centre. For shapes it is the mean of their distances.
     pub fn field(&self, p_w: &Point3<f64>) -> Field {
-        let Some((centre_w, radii_m)) = &self.body else {
-            return Field { value: 0.0, gradient: Vector3::zeros() };
-        };
-        let scaled = (p_w - centre_w).component_div(radii_m);
-        if self.is_star {
-            let (size_m, reach) = (radii_m.product().cbrt(), scaled.norm());
-            let outward = scaled.try_normalize(0.0).unwrap_or_default();
-            let gradient = outward.component_div(radii_m) * size_m;
-            return Field { value: size_m * (reach - 1.0), gradient };
+        match self {
+            Self::Zero => NOWHERE,
+            Self::Body { centre_w, radii_m, is_star: true } => {
+                let scaled = (p_w - centre_w).component_div(radii_m);
+                let (size_m, reach) = (radii_m.product().cbrt(), scaled.norm());
+                let outward = scaled.try_normalize(0.0).unwrap_or_default();
+                let gradient = outward.component_div(radii_m) * size_m;
+                Field { value: size_m * (reach - 1.0), gradient }
+            }
+            Self::Body { centre_w, radii_m, is_star: false } => {
+                let scaled = (p_w - centre_w).component_div(radii_m);
+                let least_m = radii_m.min();
+                Field {
+                    value: 0.5 * least_m * (scaled.norm_squared() - 1.0),
+                    gradient: scaled.component_div(radii_m) * least_m,
+                }
+            }
+            Self::Shapes(shapes) => shapes.iter().fold(NOWHERE, |sum, shape| {
+                let Field { value, gradient } = shape.field(p_w);
+                sum + Field { value: shape.weight * value, gradient: gradient * shape.weight }
+            }),
         }
-        let least_m = radii_m.min();
-        Field {
-            value: 0.5 * least_m * (scaled.norm_squared() - 1.0),
-            gradient: scaled.component_div(radii_m) * least_m,
+    }
+
+    /// Returns the corners of a box around the shapes, in `W`; `None` for another prior.
+    pub fn bounds(&self) -> Option<[Point3<f64>; 2]> {
+        let Self::Shapes(shapes) = self else { return None };
+        let each = shapes.iter().map(KnownShape::bounds);
+        each.reduce(|[low, high], [other_low, other_high]| {
+            [low.inf(&other_low), high.sup(&other_high)]
+        })
+    }
+
+    /// Returns the offset from the centre of a star, per half axis, with the half axes.
+    fn of_star(&self, p_w: &Point3<f64>) -> Option<(Vector3<f64>, &Vector3<f64>)> {
+        match self {
+            Self::Body { centre_w, radii_m, is_star: true } => {
+                Some(((p_w - centre_w).component_div(radii_m), radii_m))
+            }
+            _ => None,
         }
     }
 
     /// Returns the coordinates of `p_w`: its place, or the direction d = (v / r) / |v / r|.
     pub fn coordinates(&self, p_w: &Point3<f64>) -> Vector3<f64> {
-        match &self.body {
-            Some((centre_w, radii_m)) if self.is_star => {
-                let scaled = (p_w - centre_w).component_div(radii_m);
-                scaled.try_normalize(0.0).unwrap_or_default()
-            }
-            _ => p_w.coords,
+        match self.of_star(p_w) {
+            Some((scaled, _)) => scaled.try_normalize(0.0).unwrap_or_default(),
+            None => p_w.coords,
         }
     }
 
     /// Returns the gradient over space at `p_w` of a function with this gradient over the
     /// coordinates: (g − d (d·g)) / |v / r| / r for a direction.
     pub fn gradient(&self, p_w: &Point3<f64>, over_coordinates: Vector3<f64>) -> Vector3<f64> {
-        match &self.body {
-            Some((centre_w, radii_m)) if self.is_star => {
-                let scaled = (p_w - centre_w).component_div(radii_m);
-                let Some(outward) = scaled.try_normalize(0.0) else { return Vector3::zeros() };
-                let across = over_coordinates - outward * outward.dot(&over_coordinates);
-                across.component_div(radii_m) / scaled.norm()
-            }
-            _ => over_coordinates,
-        }
+        let Some((scaled, radii_m)) = self.of_star(p_w) else { return over_coordinates };
+        let Some(outward) = scaled.try_normalize(0.0) else { return Vector3::zeros() };
+        let across = over_coordinates - outward * outward.dot(&over_coordinates);
+        across.component_div(radii_m) / scaled.norm()
     }
 }
+
+/// A field of zeros.
+const NOWHERE: Field = Field { value: 0.0, gradient: Vector3::new(0.0, 0.0, 0.0) };
 
 /// Returns centre and half axes of the ellipsoid whose uniformly touched surface has the mean and
 /// the relative deviations of `points`, as large as they are on average; `None` unless two differ.
@@ -381,7 +435,7 @@ mod tests {
         let points: Vec<Point3<f64>> = points.collect();
         let ball = Ball { centre_w: Point3::origin(), radius_m: 0.2, lowest_m: None };
         let star = PriorMean::about(PriorShape::Star, &ball, points.iter());
-        let Some((centre_w, radii_m)) = star.body else { panic!() };
+        let PriorMean::Body { centre_w, radii_m, .. } = star else { panic!() };
         let expected = Vector3::new(0.06, 0.04, 0.1);
         assert!((radii_m - expected).amax() < 2e-3, "{radii_m}");
         for p_w in &points {

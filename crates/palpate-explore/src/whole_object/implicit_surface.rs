@@ -1,6 +1,8 @@
 //! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
 //! inside (Williams & Fitzgibbon 2007).
 
+mod like;
+
 use super::evidence::{
     CameraPose, CommonError, ObservationModel, PriorMean, SpatialEvidence, half_axes_m,
 };
@@ -9,6 +11,7 @@ use super::settings::{PriorShape, SpatialGpSettings};
 use super::surface::Surface;
 use crate::evidence::{End, Evidence, Outcome};
 use crate::gp_settings::{COMMON_ERROR_M, COMMON_RANGE};
+use crate::recognition::KnownShape;
 use crate::task::{Aim, Ball, Target};
 use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -20,7 +23,7 @@ use palpate_gp::likelihood::Likelihood;
 use palpate_gp::math::optimize::compass;
 use palpate_gp::means::MeanField;
 use palpate_gp::{
-    Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
+    Hyperparameters, LogNormal, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
 };
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +39,9 @@ pub struct ImplicitSurface {
     fit: Option<Fit>,
     /// Hyperparameters that the last fit started from.
     start: Option<Hyperparameters>,
+    /// Shapes that the object may be like, with their probabilities: the prior mean is theirs.
+    #[serde(skip)]
+    shapes: Vec<KnownShape>,
     #[serde(skip)]
     surface: Option<Surface>,
 }
@@ -51,6 +57,14 @@ fn default_kernel() -> &'static dyn Kernel {
 /// and the object fills a part of the ball.
 const SIGNAL: f64 = 0.5;
 const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];
+
+/// Standard deviation of the difference between objects of a kind, as a fraction of their radius.
+// heuristic: as for a shape near to one of the library, on an object for a hand.
+const RELATED: LogNormal = LogNormal { median: 0.1, spread: 3.0 };
+
+/// Largest length over which objects of a kind differ alike, as a fraction of their radius.
+// heuristic: half the size of an object for a hand; few contacts would make it any length.
+const ALIKE: f64 = 0.5;
 
 /// Computational budget of a fit in cubed matrix sizes, with at least [`TRIED_MIN`] factorisations;
 /// a heuristic: some ten milliseconds.
@@ -99,8 +113,8 @@ impl ImplicitSurface {
     pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (SpatialEvidence::default(), Vec::new());
-        let (fit, start, surface) = (None, None, None);
-        Self { scope, settings, kernel, evidence, asked, fit, start, surface }
+        let (fit, start, shapes, surface) = (None, None, Vec::new(), None);
+        Self { scope, settings, kernel, evidence, asked, fit, start, shapes, surface }
     }
 
     /// Adds what an action at `target` has shown; the belief changes at the next
@@ -255,7 +269,9 @@ impl ImplicitSurface {
         posterior.inflate(self.settings.sd_inflation);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
         let (scope, points) = (&self.scope, self.points());
+        let parts = self.parts(start.as_ref(), &posterior);
         let surface = Surface::new(scope, prior, posterior, pose_errors, points.iter(), offset_m);
+        let surface = surface.with_parts(parts);
         self.start = start;
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
@@ -267,9 +283,11 @@ impl ImplicitSurface {
         loadings.map(|column| MeanField::response(given, column)).collect()
     }
 
-    /// Returns the ball around all that was touched or seen.
+    /// Returns the ball around all that was touched or seen, and around the likeliest shape.
     pub fn estimated_ball(&self) -> Ball {
-        self.scope.estimated_ball(self.points().iter())
+        let points = self.points();
+        let corners = self.shapes.first().map(KnownShape::bounds);
+        self.scope.ball_around(points.iter().chain(corners.iter().flatten()))
     }
 
     /// Registers the views, and returns the observations, in units of the noise of `last`.
@@ -288,19 +306,33 @@ impl ImplicitSurface {
         last: Option<&Hyperparameters>,
         pose: CameraPose,
     ) -> (PriorMean, Observations) {
-        let points = self.points();
-        let ball = self.scope.estimated_ball(points.iter());
-        let prior = PriorMean::about(self.settings.prior, &ball, points.iter());
+        let prior = match self.shapes.is_empty() {
+            true => {
+                PriorMean::about(self.settings.prior, &self.estimated_ball(), self.points().iter())
+            }
+            false => PriorMean::Shapes(self.shapes.clone()),
+        };
+        let observations = self.relative_to(&prior, last, pose);
+        (prior, observations)
+    }
+
+    /// Returns the observations relative to a prior mean.
+    fn relative_to(
+        &self,
+        prior: &PriorMean,
+        last: Option<&Hyperparameters>,
+        pose: CameraPose,
+    ) -> Observations {
+        let ball = self.estimated_ball();
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
-        let observations = self.evidence.observations(&ObservationModel {
-            prior: &prior,
+        self.evidence.observations(&ObservationModel {
+            prior,
             ball: &ball,
             noise_m: last.map_or(unknown_m, |last| last.noise_sd),
             normals: self.normals(),
             free_space_samples: self.settings.free_space_samples,
             pose,
-        });
-        (prior, observations)
+        })
     }
 
     /// Returns the logarithm of the object's extent along each axis, relative to their geometric
@@ -330,6 +362,8 @@ impl ImplicitSurface {
         let lengths_m =
             |exponent: f64, length_m: f64| extents.map(|log| length_m * (exponent * log).exp());
         let SpatialGpSettings { length_scale, noise, slope_noise, .. } = &self.settings;
+        let longest = if self.shapes.is_empty() { f64::INFINITY } else { ALIKE };
+        let length_scale = length_scale.map(|share| share.min(longest));
         let mut ranges = vec![length_scale.map(|share| share * unit), *noise];
         ranges.extend(self.normals().then_some(*slope_noise));
         // Errors of known size do not grow with the signal, which is then searched too.
@@ -369,7 +403,9 @@ impl ImplicitSurface {
         let signal_sd = match common {
             CommonError::Stated => SignalModel::Searched,
             CommonError::None | CommonError::Learned | CommonError::Assumed => {
-                SignalModel::Profiled(Range { low: signals_m[0], high: signals_m[1], prior: None })
+                let prior = (!self.shapes.is_empty()).then(|| RELATED.scaled(radius_m));
+                let least_m = prior.map_or(signals_m[0], |prior| prior.median / prior.spread);
+                SignalModel::Profiled(Range { low: least_m, high: signals_m[1], prior })
             }
         };
         let parameters = |logs: &[f64]| parameters(logs, common);

@@ -55,10 +55,10 @@ impl ExplorationSetup {
         Self { ball, radius_m: task.finger().radius_m, offset_m, task: Arc::new(task.clone()) }
     }
 
-    /// Returns the ball around `contacts`, which estimates the object's size; the ball of the scope
-    /// before there are two contacts.
-    pub fn estimated_ball<'a>(&self, contacts: impl Iterator<Item = &'a Point3<f64>>) -> Ball {
-        let spanned = extent(contacts).filter(|[low, high]| low != high);
+    /// Returns the ball around `points`, which estimates the object's size; the ball of the scope
+    /// before there are two.
+    pub fn ball_around<'a>(&self, points: impl Iterator<Item = &'a Point3<f64>>) -> Ball {
+        let spanned = extent(points).filter(|[low, high]| low != high);
         let Some(spanned) = spanned else { return self.ball };
         let about = Ball::around_box(spanned, self.ball.lowest_m);
         let radius_m = about.radius_m.max(self.radius_m).min(self.ball.radius_m);

@@ -47,6 +47,9 @@ pub enum PriorShape {
     Ellipsoid,
     /// A sphere about the centre of that box, as large as the ellipsoid.
     Sphere,
+    /// The objects of the scene's library, stretched, wherever recognition places them; an
+    /// ellipsoid as long as the touches rather suggest none of them.
+    Library,
     /// Zero: far from all touches, points are neither inside nor outside.
     None,
     /// An ellipsoid about the contacts' mean, from which the surface departs by a function of the
@@ -82,7 +85,7 @@ impl Validate for SpatialGpSettings {
     fn check(&self, rules: &mut Rules) {
         rules.one_of("kernel", &self.kernel, &KERNELS);
         rules.require("prior", "\"star\"", self.prior != PriorShape::Star, || {
-            "ellipsoid, sphere, none".into()
+            "ellipsoid, sphere, library, none".into()
         });
         rules.interval("length_scale", self.length_scale, 1e-2..=100.0);
         rules.interval("noise", self.noise, 1e-6..=10.0);

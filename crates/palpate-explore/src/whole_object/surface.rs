@@ -26,11 +26,21 @@ pub struct Surface {
     /// Fields that the errors of the cameras' poses add to the mean, each with a standard normal
     /// factor.
     pose_errors: Vec<MeanField>,
+    /// Surfaces of which this is the mean, if it is.
+    parts: Vec<Part>,
     contacts: Vec<Point3<f64>>,
     /// Standard deviation of the error common to all contacts.
     offset_m: f64,
     /// Corners of the box that contains the surface.
     bounds: [Point3<f64>; 2],
+}
+
+/// One of the surfaces of which another is the mean.
+#[derive(Clone)]
+pub(super) struct Part {
+    pub weight: f64,
+    pub prior: PriorMean,
+    pub mean: MeanField,
 }
 
 /// Margin of a surface's box around its contacts, as a fraction of the radius of the ball around
@@ -75,10 +85,10 @@ impl Surface {
         let contacts: Vec<Point3<f64>> = contacts.copied().collect();
         let Ball { centre_w, radius_m, .. } = &scope.ball;
         let [ball_low, ball_high] = [-radius_m, *radius_m].map(|r| centre_w.map(|x| x + r));
-        let bounds = match extent(&contacts) {
+        let bounds = match spanned(&contacts, &prior) {
             None => [ball_low, ball_high],
             Some([low, high]) => {
-                let beyond_m = BEYOND * scope.estimated_ball(contacts.iter()).radius_m;
+                let beyond_m = BEYOND * scope.ball_around([low, high].iter()).radius_m;
                 [
                     low.map(|x| x - beyond_m).sup(&ball_low),
                     high.map(|x| x + beyond_m).inf(&ball_high),
@@ -86,7 +96,13 @@ impl Surface {
             }
         };
         let mean = MeanField::from(&posterior);
-        Self { prior, mean, posterior, pose_errors, contacts, offset_m, bounds }
+        let parts = Vec::new();
+        Self { prior, mean, posterior, pose_errors, parts, contacts, offset_m, bounds }
+    }
+
+    /// Sets the surfaces of which this is the mean.
+    pub(super) fn with_parts(self, parts: Vec<Part>) -> Self {
+        Self { parts, ..self }
     }
 
     /// Returns the mean at `p_w`, m: negative inside.
@@ -150,6 +166,15 @@ impl Surface {
                 .iter_mut()
                 .zip(values)
                 .for_each(|(variance, value)| *variance += value * value);
+        }
+        if !self.parts.is_empty() {
+            let values = self.values(points_w);
+            for part in &self.parts {
+                let off = part.values(points_w, &places).into_iter().zip(&values);
+                (variances.iter_mut().zip(off)).for_each(|(variance, (value, mean))| {
+                    *variance += part.weight * (value - mean).powi(2);
+                });
+            }
         }
         let offset2 = self.offset_m * self.offset_m;
         variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
@@ -280,6 +305,22 @@ impl Surface {
             moving = moved.collect();
         }
     }
+}
+
+impl Part {
+    /// Returns the values at points with these coordinates.
+    fn values(&self, points_w: &[Point3<f64>], places: &[&[f64]]) -> Vec<f64> {
+        let mut values = self.mean.values(places, &mut []);
+        let prior = points_w.iter().map(|p_w| self.prior.field(p_w).value);
+        values.iter_mut().zip(prior).for_each(|(value, prior)| *value += prior);
+        values
+    }
+}
+
+/// Returns the corners of a box around the contacts and the shapes of a prior.
+fn spanned(contacts: &[Point3<f64>], prior: &PriorMean) -> Option<[Point3<f64>; 2]> {
+    let corners = prior.bounds();
+    extent(contacts.iter().chain(corners.iter().flatten()))
 }
 
 /// Returns about `most` of `points`, every n-th from `first(n)` on.
