@@ -2,7 +2,7 @@
 
 #![allow(dead_code)]
 
-use nalgebra::{Point3, Vector3, vector};
+use nalgebra::{Point3, Vector3, point, vector};
 use palpate::geometry::implicit::Field;
 
 /// Radius of rounded edges, metres.
@@ -35,6 +35,14 @@ pub fn cuboid(p: Point3<f64>, at: Point3<f64>, half_m: [f64; 3]) -> Field {
         [axis, -axis].map(|outward| Field::plane(p, at + outward * half_m, outward))
     });
     planes.reduce(|a, b| a.intersection(b, EDGE_M)).unwrap_or(Field::plane(p, at, Vector3::y()))
+}
+
+/// Returns an upright cylinder between two heights.
+pub fn cylinder(p: Point3<f64>, radius_m: f64, [low_m, high_m]: [f64; 2]) -> Field {
+    let side = Field::ellipsoid(p.coords, vector![radius_m, radius_m, f64::INFINITY]);
+    let top = Field::plane(p, point![0.0, 0.0, high_m], Vector3::z());
+    let bottom = Field::plane(p, point![0.0, 0.0, low_m], -Vector3::z());
+    side.intersection(top, EDGE_M).intersection(bottom, EDGE_M)
 }
 
 /// Returns a disc that faces +y.

@@ -8,9 +8,9 @@ mod fields;
 mod meshing;
 
 use anyhow::{Context, Result};
-use fields::{EDGE_M, cuboid, rod, together};
+use fields::{cuboid, cylinder, rod, together};
 use meshing::{glb, nets};
-use nalgebra::{Point3, Vector3, point, vector};
+use nalgebra::{Point3, Vector3, point};
 use palpate::geometry::implicit::{Field, ImplicitSolid};
 use palpate::gp::math::seed;
 use rand::RngExt;
@@ -67,14 +67,6 @@ fn main() -> Result<()> {
 
 fn between(low: f64, high: f64, share: f64) -> f64 {
     low + share * (high - low)
-}
-
-/// Returns an upright cylinder between two heights.
-fn cylinder(p: Point3<f64>, radius_m: f64, [low_m, high_m]: [f64; 2]) -> Field {
-    let side = Field::ellipsoid(p.coords, vector![radius_m, radius_m, f64::INFINITY]);
-    let top = Field::plane(p, point![0.0, 0.0, high_m], Vector3::z());
-    let bottom = Field::plane(p, point![0.0, 0.0, low_m], -Vector3::z());
-    side.intersection(top, EDGE_M).intersection(bottom, EDGE_M)
 }
 
 fn mug(p: Point3<f64>, numbers: &[f64; 8]) -> Field {

@@ -46,6 +46,12 @@ fn a_bottle_is_rebuilt_from_other_bottles() {
         let surface = belief.implicit_surface().unwrap().surface().unwrap();
         let again = truth.evaluate(surface, experiment.space.cells);
         assert_eq!(row.touches[count as usize - 1].shape, Some(again));
+        let points_w = surface.points(16, 20, |_| 0).unwrap();
+        let covariances_m2 = surface.covariances_m2(&points_w, &points_w);
+        for (i, sd_m) in surface.sds_m(&points_w).into_iter().enumerate() {
+            let share = covariances_m2[i][i] / (sd_m * sd_m);
+            assert!((share - 1.0).abs() < 1e-6, "{count} touches, point {i}: {share}");
+        }
     }
     let (experiment, row, _) = &alone;
     assert_eq!(row.touches.last().unwrap().likeness, None);

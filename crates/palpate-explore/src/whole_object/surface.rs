@@ -122,10 +122,7 @@ impl Surface {
     pub fn values(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
         let values = points_w.par_chunks(CHUNK).map(|points_w| {
             let places = self.places(points_w);
-            let mut values = self.mean.values(&slices(&places), &mut []);
-            let prior = points_w.iter().map(|p_w| self.prior.field(p_w).value);
-            values.iter_mut().zip(prior).for_each(|(value, prior)| *value += prior);
-            values
+            values(&self.prior, &self.mean, points_w, &slices(&places))
         });
         values.flatten_iter().collect()
     }
@@ -160,41 +157,42 @@ impl Surface {
         let variances = variances.map(|places| self.posterior.variances(places, &mut []));
         let mut variances: Vec<f64> = variances.flatten_iter().collect();
         let places = slices(&coordinates);
-        for error in &self.pose_errors {
-            let values = error.values(&places, &mut []).into_iter();
-            variances
-                .iter_mut()
-                .zip(values)
-                .for_each(|(variance, value)| *variance += value * value);
-        }
-        if !self.parts.is_empty() {
-            let values = self.values(points_w);
-            for part in &self.parts {
-                let off = part.values(points_w, &places).into_iter().zip(&values);
-                (variances.iter_mut().zip(off)).for_each(|(variance, (value, mean))| {
-                    *variance += part.weight * (value - mean).powi(2);
-                });
-            }
+        for column in self.common_m(points_w, &places) {
+            (variances.iter_mut().zip(column)).for_each(|(variance, off_m)| {
+                *variance += off_m * off_m;
+            });
         }
         let offset2 = self.offset_m * self.offset_m;
         variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
     }
 
     /// Returns the covariances of the field at each of `a_w` with each of `b_w`, m²: one row for
-    /// each of `a_w`. Errors of cameras' poses and of all contacts are common to all points.
+    /// each of `a_w`. Errors of cameras' poses and of all contacts, and what the shapes of a prior
+    /// differ by, are common to all points.
     pub fn covariances_m2(&self, a_w: &[Point3<f64>], b_w: &[Point3<f64>]) -> Vec<Vec<f64>> {
         let [a, b] = [a_w, b_w].map(|points_w| self.places(points_w));
         let [a, b] = [slices(&a), slices(&b)];
         let mut rows = VarianceReduction::new(&self.posterior, b.iter().copied()).covariances(&a);
         let offset2 = self.offset_m * self.offset_m;
         rows.iter_mut().flatten().for_each(|covariance| *covariance += offset2);
-        for error in &self.pose_errors {
-            let [at_a, at_b] = [&a, &b].map(|places| error.values(places, &mut []));
+        for (at_a, at_b) in self.common_m(a_w, &a).into_iter().zip(self.common_m(b_w, &b)) {
             for (row, at_a) in rows.iter_mut().zip(at_a) {
                 row.iter_mut().zip(&at_b).for_each(|(covariance, at_b)| *covariance += at_a * at_b);
             }
         }
         rows
+    }
+
+    /// Returns what all points are off by in common, m, a column for each cause: the errors of
+    /// cameras' poses, and the surfaces of which this is the mean, by the roots of their weights.
+    fn common_m(&self, points_w: &[Point3<f64>], places: &[&[f64]]) -> Vec<Vec<f64>> {
+        let means_m = if self.parts.is_empty() { Vec::new() } else { self.values(points_w) };
+        let errors = self.pose_errors.iter().map(|error| error.values(places, &mut []));
+        let parts = self.parts.iter().map(|Part { weight, prior, mean }| {
+            let values_m = values(prior, mean, points_w, places).into_iter().zip(&means_m);
+            values_m.map(|(value_m, mean_m)| weight.sqrt() * (value_m - mean_m)).collect()
+        });
+        errors.chain(parts).collect()
     }
 
     /// Standard deviation of the surface along its normal at each of `points_w` on it: σ / |∇f|.
@@ -307,14 +305,17 @@ impl Surface {
     }
 }
 
-impl Part {
-    /// Returns the values at points with these coordinates.
-    fn values(&self, points_w: &[Point3<f64>], places: &[&[f64]]) -> Vec<f64> {
-        let mut values = self.mean.values(places, &mut []);
-        let prior = points_w.iter().map(|p_w| self.prior.field(p_w).value);
-        values.iter_mut().zip(prior).for_each(|(value, prior)| *value += prior);
-        values
-    }
+/// Returns the values of a mean relative to `prior` at points with these coordinates.
+fn values(
+    prior: &PriorMean,
+    mean: &MeanField,
+    points_w: &[Point3<f64>],
+    places: &[&[f64]],
+) -> Vec<f64> {
+    let mut values = mean.values(places, &mut []);
+    let prior = points_w.iter().map(|p_w| prior.field(p_w).value);
+    values.iter_mut().zip(prior).for_each(|(value, prior)| *value += prior);
+    values
 }
 
 /// Returns the corners of a box around the contacts and the shapes of a prior.

@@ -70,7 +70,8 @@ impl ImplicitSurface {
             None => self.search_about(any.clone(), None)?.hyperparameters,
         };
         let compared = likeliest(self.weighed(distinct, &last, start.as_ref())?, COMPARED);
-        let fit = self.search_about(compared[0].clone(), start.as_ref())?;
+        let Some(best) = compared.first().cloned() else { return Ok(()) };
+        let fit = self.search_about(best, start.as_ref())?;
         let weighed = self.weighed(compared, &fit.hyperparameters, start.as_ref())?;
         self.shapes = likeliest(weighed, SHAPES);
         self.condition_from(start, &fit)
