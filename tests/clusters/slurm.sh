@@ -36,11 +36,14 @@ MpiDefault=none
 NodeName=$node NodeAddr=127.0.0.1 CPUs=$(nproc) State=UNKNOWN
 PartitionName=main Nodes=$node Default=YES MaxTime=INFINITE State=UP
 CONF
+# Ends the daemons, and returns when none writes into the folder any more.
 stop() {
-    for pid in "$here"/slurmd.pid "$here"/slurmctld.pid "$here"/munge/pid; do
-        [ ! -s "$pid" ] || kill "$(cat "$pid")" 2>/dev/null || true
+    for file in "$here"/slurmd.pid "$here"/slurmctld.pid "$here"/munge/pid; do
+        [ -s "$file" ] || continue
+        pid=$(cat "$file")
+        kill "$pid" 2>/dev/null || continue
+        timeout 30 tail -s 0.1 --pid="$pid" -f /dev/null || kill -KILL "$pid" || true
     done
-    while pkill -0 -f "$here/munge/socket"; do sleep 0.1; done
 }
 trap stop EXIT
 head -c 1024 /dev/urandom >"$here/munge/key"
