@@ -25,7 +25,7 @@ pub fn touches() -> Vec<Arc<Measurement>> {
             let free = FreeVolume::new(finger.clone(), &approach, p_wt, End::Contact);
             let evidence = vec![Evidence::Points(contact.into()), Evidence::Free(free)];
             let outcome = Outcome::new(End::Contact, evidence);
-            let evidence = TouchMeasurement::new(&outcome, 0.0, None);
+            let evidence = TouchMeasurement::new(&outcome, 0.0, None, 0.1);
             Arc::new(Measurement::Touch(evidence.unwrap()))
         })
         .collect()

@@ -1,7 +1,7 @@
 //! Hypotheses about object and pose, and *none of these*.
 
 use super::known_shape::KnownShape;
-use super::library::{Library, LibraryObject};
+use super::library::{Library, LibraryObject, PlacedObject};
 use super::measurement::{
     Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull, log_sum_exp,
 };
@@ -219,7 +219,8 @@ impl ObjectHypotheses {
         evidence: &'a [Arc<Measurement>],
         noise: NoiseModel,
     ) -> Model<'a> {
-        Model { object: &self.library.objects()[number], prior: &self.prior, evidence, noise }
+        let object = &self.library.objects()[number];
+        Model { object, prior: &self.prior, evidence, noise, is_coarse: false }
     }
 
     /// The objects.
@@ -237,8 +238,10 @@ impl ObjectHypotheses {
     pub fn observe(&mut self, outcome: &Outcome) {
         let measurement = match outcome.seen() {
             Some(seen) => ViewMeasurement::new(seen).map(Measurement::View),
-            None => TouchMeasurement::new(outcome, self.slack_m, self.pad.as_ref())
-                .map(Measurement::Touch),
+            None => {
+                let (pad, region_m) = (self.pad.as_ref(), self.task.region().widest_m());
+                TouchMeasurement::new(outcome, self.slack_m, pad, region_m).map(Measurement::Touch)
+            }
         };
         self.push(measurement);
     }
@@ -261,21 +264,25 @@ impl ObjectHypotheses {
         let wanted = self.particles() as usize;
         let Self { library, prior, evidence, noise, objects, near, .. } = self;
         let of_near = (wanted / NEAR_PART as usize).max(FEWEST as usize);
-        for (bank, noise, wanted) in [(objects, *noise, wanted), (near, NEAR_SHAPE, of_near)] {
+        // A near shape differs by more than the grid of distances errs.
+        let banks = [(objects, *noise, wanted, false), (near, NEAR_SHAPE, of_near, true)];
+        for (bank, noise, wanted, is_coarse) in banks {
             let each = bank.par_iter_mut().zip(library.objects());
             each.filter(|(posterior, _)| posterior.is_possible).for_each(|(posterior, object)| {
-                let model = Model { object, prior, evidence, noise };
-                posterior.particles.update(&model, wanted, &mut posterior.random);
+                let model = Model { object, prior, evidence, noise, is_coarse };
+                posterior.update(&model, wanted);
             });
         }
     }
 
     /// Leaves out hopeless objects.
     fn leave_out(&mut self) {
-        let evidences = self.objects.iter().map(|it| it.particles.log_evidence);
-        let best = evidences.fold(f64::NEG_INFINITY, f64::max);
-        for posterior in &mut self.objects {
-            posterior.is_possible &= posterior.particles.log_evidence > best + HOPELESS;
+        for bank in [&mut self.objects, &mut self.near] {
+            let evidences = bank.iter().map(|it| it.particles.log_evidence);
+            let best = evidences.fold(f64::NEG_INFINITY, f64::max);
+            for posterior in bank {
+                posterior.is_possible &= posterior.particles.log_evidence > best + HOPELESS;
+            }
         }
     }
 
@@ -293,7 +300,8 @@ impl ObjectHypotheses {
     /// out whose shape fits there. Those left out are looked at after some touches.
     fn revise(&mut self) {
         let is_due = SEARCHES.contains(&self.evidence.len());
-        let is_wide = is_due && self.is_doubtful();
+        let is_doubtful = self.is_doubtful();
+        let is_wide = is_due && is_doubtful;
         let wanted = self.particles() as usize;
         let Self { library, prior, evidence, noise, objects, .. } = self;
         let log = |posterior: &ObjectPosterior| posterior.particles.log_evidence;
@@ -301,16 +309,25 @@ impl ObjectHypotheses {
         let first = numbers.max_by(|a, b| log(&objects[*a]).total_cmp(&log(&objects[*b])));
         let Some(first) = first else { return };
         let noise = *noise;
-        let model =
-            |number: usize| Model { object: &library.objects()[number], prior, evidence, noise };
+        let model = |number: usize| Model {
+            object: &library.objects()[number],
+            prior,
+            evidence,
+            noise,
+            is_coarse: false,
+        };
         let search = Search { guesses: &[], best: log(&objects[first]), is_wide, wanted };
-        objects[first].revise(&model(first), &search);
+        let is_needed =
+            |it: &ObjectPosterior| is_due || (it.is_possible && (it.is_surprised || is_doubtful));
+        if is_needed(&objects[first]) {
+            objects[first].revise(&model(first), &search);
+        }
         let guesses: Vec<_> = objects[first].peaks.iter().take(GUESSES).copied().collect();
         let search = Search { guesses: &guesses, best: log(&objects[first]), ..search };
         let others = objects
             .par_iter_mut()
             .enumerate()
-            .filter(|(number, posterior)| *number != first && (posterior.is_possible || is_due));
+            .filter(|(number, posterior)| *number != first && is_needed(posterior));
         others.for_each(|(number, posterior)| posterior.revise(&model(number), &search));
         self.leave_out();
     }
@@ -474,13 +491,14 @@ impl ObjectHypotheses {
         let start_w = approach.p_near_w - ahead_w.scale(before_m);
         let hull = hull(finger, &approach.r_wt(), start_w);
         let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + finger.radius_m;
-        let hit = object.sweep(&hypothesis.x_wo, &hull, &ahead_w, way_m)?;
+        let placed = PlacedObject::exact(object, &hypothesis.x_wo);
+        let hit = placed.sweep(&hull, &ahead_w, way_m)?;
         let p_wt = start_w + ahead_w.scale(hit.travel_m);
-        let behind_m = (hit.point - p_wt).dot(&(hull.p1_w - hull.p0_w)) / finger.length_m;
+        let behind_m = (hit.p_w - p_wt).dot(&(hull.p1_w - hull.p0_w)) / finger.length_m;
         Some(Prediction {
             way_m: hit.travel_m - before_m,
-            normal_w: hit.normal,
-            p_w: hit.point,
+            normal_w: hit.normal_w,
+            p_w: hit.p_w,
             is_on_tip: finger.length_m == 0.0 || behind_m <= finger.radius_m,
         })
     }

@@ -1,8 +1,9 @@
 //! Library: the objects that may be in the region, each with its mesh.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use palpate_geometry::bvh::{MeshBvh, SweepHit};
+use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::distance_grid::DistanceGrid;
+use palpate_geometry::implicit::Field;
 use palpate_geometry::low_discrepancy::over_surface;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::normal;
@@ -73,35 +74,6 @@ impl LibraryObject {
         self.distances.get_or_init(|| DistanceGrid::new(&self.bvh, CELLS))
     }
 
-    /// Returns the first contact, in `W`, of a capsule in `W` that travels along `ahead_w`, with
-    /// the object at the pose `x_wo`.
-    pub(super) fn sweep(
-        &self,
-        x_wo: &Isometry3<f64>,
-        hull_w: &Capsule,
-        ahead_w: &UnitVector3<f64>,
-        way_m: f64,
-    ) -> Option<SweepHit> {
-        let hull = Capsule {
-            p0_w: x_wo.inverse_transform_point(&hull_w.p0_w),
-            p1_w: x_wo.inverse_transform_point(&hull_w.p1_w),
-            ..*hull_w
-        };
-        let ahead_o = x_wo.inverse_transform_unit_vector(ahead_w);
-        let hit = self.bvh.sweep(&hull, &ahead_o, way_m)?;
-        Some(SweepHit { point: x_wo * hit.point, normal: x_wo * hit.normal, ..hit })
-    }
-
-    /// Returns the point of the surface nearest to `p_w`, in `W`, the normal of its face, and the
-    /// distance of `p_w` from it, m, negative behind the face.
-    pub(super) fn nearest(&self, x_wo: &Isometry3<f64>, p_w: &Point3<f64>) -> Nearest {
-        let closest = self.bvh.closest_point(&x_wo.inverse_transform_point(p_w));
-        let q_w = x_wo * closest.point;
-        let face_w = x_wo * normal(&self.bvh.mesh().corners(closest.triangle as usize));
-        let side = if (p_w - q_w).dot(&face_w) < 0.0 { -1.0 } else { 1.0 };
-        Nearest { q_w, face_w, distance_m: side * closest.distance_m }
-    }
-
     /// Returns the mean distance between the surface at the pose `x_wo` and at the pose `other`, m:
     /// the mean over points of the one to the nearest point of the other. Poses that a symmetry of
     /// the object makes equal are at distance zero (ADD-S, Hinterstoisser et al. 2012, with the
@@ -122,6 +94,74 @@ impl LibraryObject {
         let count = points.len().max(1) as f64;
         points.map(|p_o| self.bvh.closest_point(&(between * p_o)).distance_m).sum::<f64>() / count
     }
+}
+
+/// An object at a pose.
+#[derive(Clone, Copy)]
+pub(super) struct PlacedObject<'a> {
+    pub object: &'a LibraryObject,
+    pub x_wo: &'a Isometry3<f64>,
+    /// Whether distances are those of the object's grid, which suffice where contacts may be off by
+    /// as much as its cells.
+    pub is_coarse: bool,
+}
+
+impl<'a> PlacedObject<'a> {
+    pub fn exact(object: &'a LibraryObject, x_wo: &'a Isometry3<f64>) -> Self {
+        Self { object, x_wo, is_coarse: false }
+    }
+
+    /// Returns the first contact of a capsule that travels along `ahead_w`.
+    pub fn sweep(
+        &self,
+        hull_w: &Capsule,
+        ahead_w: &UnitVector3<f64>,
+        way_m: f64,
+    ) -> Option<HullContact> {
+        let x_wo = self.x_wo;
+        let hull = Capsule {
+            p0_w: x_wo.inverse_transform_point(&hull_w.p0_w),
+            p1_w: x_wo.inverse_transform_point(&hull_w.p1_w),
+            ..*hull_w
+        };
+        let ahead_o = x_wo.inverse_transform_unit_vector(ahead_w);
+        let contact = |travel_m: f64, point: Point3<f64>, normal: Vector3<f64>| HullContact {
+            travel_m,
+            p_w: x_wo * point,
+            normal_w: x_wo * normal,
+        };
+        if self.is_coarse {
+            let hit = self.object.distances().sweep(&hull, &ahead_o, way_m)?;
+            return Some(contact(hit.travel_m, hit.point, hit.normal));
+        }
+        let hit = self.object.bvh.sweep(&hull, &ahead_o, way_m)?;
+        Some(contact(hit.travel_m, hit.point, hit.normal))
+    }
+
+    /// Returns the point of the surface nearest to `p_w`, the normal of its face, and the distance
+    /// of `p_w` from it, m, negative behind the face.
+    pub fn nearest(&self, p_w: &Point3<f64>) -> Nearest {
+        let (object, x_wo) = (self.object, self.x_wo);
+        let p = x_wo.inverse_transform_point(p_w);
+        if self.is_coarse {
+            let Field { value, gradient } = object.distances().field(&p);
+            let face_w = x_wo * gradient.try_normalize(1e-9).unwrap_or_else(Vector3::z);
+            return Nearest { q_w: p_w - face_w * value, face_w, distance_m: value };
+        }
+        let closest = object.bvh.closest_point(&p);
+        let q_w = x_wo * closest.point;
+        let face_w = x_wo * normal(&object.bvh.mesh().corners(closest.triangle as usize));
+        let side = if (p_w - q_w).dot(&face_w) < 0.0 { -1.0 } else { 1.0 };
+        Nearest { q_w, face_w, distance_m: side * closest.distance_m }
+    }
+}
+
+/// First contact of a travelling hull with an object.
+pub(super) struct HullContact {
+    pub travel_m: f64,
+    pub p_w: Point3<f64>,
+    /// Normal from the surface towards the hull.
+    pub normal_w: Vector3<f64>,
 }
 
 /// Point of an object's surface nearest to another.

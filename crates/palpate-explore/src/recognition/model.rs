@@ -1,6 +1,6 @@
 //! Log-posterior of an object's pose, with its second-order approximation.
 
-use super::library::LibraryObject;
+use super::library::{LibraryObject, PlacedObject};
 use super::measurement::{LogLikelihood, Measurement, MeasurementFit, NoiseModel};
 use super::pose_prior::PosePrior;
 use nalgebra::{Cholesky, Const, Isometry3, Matrix6, Vector6};
@@ -14,12 +14,20 @@ pub(super) struct Model<'a> {
     pub prior: &'a PosePrior,
     pub evidence: &'a [Arc<Measurement>],
     pub noise: NoiseModel,
+    /// Whether residuals are those of the object's grid.
+    pub is_coarse: bool,
 }
 
 impl Model<'_> {
     /// Returns the residuals of all evidence at a pose.
     pub fn fits(&self, x_wo: &Isometry3<f64>) -> Vec<MeasurementFit> {
-        self.evidence.iter().map(|touch| touch.fit(self.object, x_wo)).collect()
+        let placed = self.placed(x_wo);
+        self.evidence.iter().map(|touch| touch.fit(&placed)).collect()
+    }
+
+    /// Returns the object at a pose.
+    pub fn placed<'a>(&'a self, x_wo: &'a Isometry3<f64>) -> PlacedObject<'a> {
+        PlacedObject { object: self.object, x_wo, is_coarse: self.is_coarse }
     }
 
     /// Returns the log-likelihood ratio of all evidence at a pose and a temperature.

@@ -40,6 +40,9 @@ pub(super) struct ObjectPosterior {
     pub is_possible: bool,
     /// Poses of the peaks.
     pub peaks: Vec<Isometry3<f64>>,
+    /// Whether the last touch was less likely than on an unknown shape: particles may have missed
+    /// the pose.
+    pub is_surprised: bool,
     /// Whether it was unlikely after the last touch.
     is_unlikely: bool,
 }
@@ -59,7 +62,21 @@ pub(super) struct Search<'a> {
 
 impl ObjectPosterior {
     pub fn new(particles: Particles, random: ChaCha8Rng) -> Self {
-        Self { particles, random, is_possible: true, peaks: Vec::new(), is_unlikely: false }
+        Self {
+            particles,
+            random,
+            is_possible: true,
+            peaks: Vec::new(),
+            is_surprised: false,
+            is_unlikely: false,
+        }
+    }
+
+    /// Takes in new evidence; `wanted` poses remain after resampling.
+    pub fn update(&mut self, model: &Model, wanted: usize) {
+        let before = self.particles.log_evidence;
+        self.particles.update(model, wanted, &mut self.random);
+        self.is_surprised = self.particles.log_evidence < before;
     }
 
     /// Looks for poses that the particles have missed, from the peaks so far, the likeliest
@@ -117,7 +134,13 @@ mod tests {
     #[test]
     fn an_object_that_particles_have_left_is_found_again() {
         let (object, prior, touches) = (touched_box(), prior(), touches());
-        let model = Model { object: &object, prior: &prior, evidence: &touches, noise: NOISE };
+        let model = Model {
+            object: &object,
+            prior: &prior,
+            evidence: &touches,
+            noise: NOISE,
+            is_coarse: false,
+        };
         let mut random = seed::stream(2, 0, "particles");
         let mut posterior = |prior: &PosePrior| {
             let model = Model { prior, ..model };

@@ -89,11 +89,19 @@ mod tests {
     fn both_contacts_lie_on_the_object() {
         let (object, touches) = (touched_box(), touches());
         let prior = PosePrior { turn: Turn::Free, ..prior() };
-        let model = Model { object: &object, prior: &prior, evidence: &touches, noise: NOISE };
+        let model = Model {
+            object: &object,
+            prior: &prior,
+            evidence: &touches,
+            noise: NOISE,
+            is_coarse: false,
+        };
         let mut random = seed::stream(3, 0, "pairs");
         let apart_m = |x_wo: &Isometry3<f64>| {
             let contacts = touches.iter().flat_map(|touch| touch.touched_w());
-            contacts.map(|(p_w, _)| object.nearest(x_wo, &p_w).distance_m.abs()).fold(0.0, f64::max)
+            contacts
+                .map(|(p_w, _)| model.placed(x_wo).nearest(&p_w).distance_m.abs())
+                .fold(0.0, f64::max)
         };
         let found = poses(&model, 64, &mut random);
         let nearest_m = found.iter().map(apart_m).fold(f64::INFINITY, f64::min);

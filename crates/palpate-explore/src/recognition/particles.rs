@@ -137,8 +137,8 @@ impl Particles {
         self.wanted = wanted;
         let known = self.particles.first().map_or(0, |particle| particle.fits.len());
         for particle in &mut self.particles {
-            let new = model.evidence[known..].iter();
-            particle.fits.extend(new.map(|touch| touch.fit(model.object, &particle.x_wo)));
+            let (new, placed) = (model.evidence[known..].iter(), model.placed(&particle.x_wo));
+            particle.fits.extend(new.map(|touch| touch.fit(&placed)));
         }
         let mut tau_m = f64::INFINITY;
         while tau_m > 0.0 {
@@ -308,6 +308,7 @@ pub(super) fn systematic(
 mod tests {
     use super::*;
     use crate::recognition::boxes::{NOISE, prior, touched_box, touches};
+    use crate::recognition::library::PlacedObject;
     use crate::recognition::peaks;
     use nalgebra::Vector3;
     use palpate_gp::math::seed;
@@ -325,7 +326,7 @@ mod tests {
             let x_wo = prior.at(&object, [at[0], at[1], 0.5, 0.0, 0.0, 0.0]);
             let mut sum = LogLikelihood::zero();
             for touch in &touches {
-                touch.add(&touch.fit(&object, &x_wo), &noise, 0.0, &mut sum);
+                touch.add(&touch.fit(&PlacedObject::exact(&object, &x_wo)), &noise, 0.0, &mut sum);
             }
             logs.push((sum.value, x_wo.translation.vector));
         }
@@ -341,6 +342,7 @@ mod tests {
             prior: &prior,
             evidence: &touches[..count],
             noise,
+            is_coarse: false,
         };
         let mut evidences = Vec::new();
         for number in 0..8 {

@@ -17,6 +17,10 @@ use std::f64::consts::{PI, TAU};
 // heuristic: from half the height of a detail to a contact's deviation.
 const CLIMB_M: [f64; 5] = [8e-3, 4e-3, 2e-3, 1e-3, 5e-4];
 
+/// Number of these at which the grid of distances suffices.
+// heuristic: its cells are some millimetres.
+const COARSE: usize = 3;
+
 /// Last steps of a climb, their halvings, and the gain below which they end, nats; heuristics.
 const STEPS: usize = 6;
 const HALVINGS: i32 = 3;
@@ -55,7 +59,8 @@ pub(super) fn log_mass(peaks: &[Peak]) -> f64 {
 
 /// Returns the peaks that the most promising starts lead to.
 pub(super) fn find(model: &Model, starts: impl Iterator<Item = Isometry3<f64>>) -> Vec<Peak> {
-    let score = |x_wo: &Isometry3<f64>| model.log_likelihood(&model.fits(x_wo), CLIMB_M[0]);
+    let coarse = Model { is_coarse: true, ..*model };
+    let score = |x_wo: &Isometry3<f64>| coarse.log_likelihood(&coarse.fits(x_wo), CLIMB_M[0]);
     let starts = starts.map(|x_wo| model.prior.clamped(model.object, x_wo));
     let promising = promising(model, starts.collect());
     let mut scored: Vec<_> = promising.into_iter().map(|x_wo| (score(&x_wo), x_wo)).collect();
@@ -89,10 +94,10 @@ fn promising(model: &Model, starts: Vec<Isometry3<f64>>) -> Vec<Isometry3<f64>> 
     if contacts.is_empty() {
         return starts;
     }
-    let most_m = 2.0 * CLIMB_M[0];
+    let (most_m, coarse) = (2.0 * CLIMB_M[0], Model { is_coarse: true, ..*model });
     let off_m2 = |x_wo: &Isometry3<f64>| -> f64 {
         let each = contacts.iter().map(|(p_w, normal_w)| {
-            let Nearest { face_w, distance_m, .. } = model.object.nearest(x_wo, p_w);
+            let Nearest { face_w, distance_m, .. } = coarse.placed(x_wo).nearest(p_w);
             // Near a thin part, the nearest face is often the one behind.
             let turned_m = normal_w.map_or(0.0, |to_w| LEVER_M * (face_w - to_w).norm());
             distance_m.powi(2) + turned_m.min(most_m).powi(2)
@@ -115,7 +120,8 @@ fn climb(model: &Model, start: &Isometry3<f64>) -> Peak {
     let after = |x_wo: &Isometry3<f64>, by: &Vector6<f64>| {
         model.prior.clamped(model.object, moved(x_wo, by))
     };
-    for tau_m in CLIMB_M {
+    for (number, tau_m) in CLIMB_M.into_iter().enumerate() {
+        let model = Model { is_coarse: model.is_coarse || number < COARSE, ..*model };
         let quadratic = model.quadratic(&model.fits(&x_wo), 0, tau_m);
         x_wo = after(&x_wo, &quadratic.to_peak);
     }

@@ -71,7 +71,8 @@ pub fn recognise(
         PosePrior { position_m: middle_w.into(), half_width_m: [largest_m; 3], turn: Turn::Free };
     let paths = free.iter().filter_map(|free| {
         let miss = Outcome::new(End::Miss, vec![Evidence::Free(free.clone())]);
-        TouchMeasurement::new(&miss, 0.0, None).map(|touch| Arc::new(Measurement::Touch(touch)))
+        TouchMeasurement::new(&miss, 0.0, None, 0.0)
+            .map(|touch| Arc::new(Measurement::Touch(touch)))
     });
     let set = Arc::new(set);
     let contacts = Arc::new(Measurement::Contacts(Arc::clone(&set)));
@@ -79,7 +80,13 @@ pub fn recognise(
     let numbered: Vec<_> = library.objects().iter().enumerate().collect();
     let mut found: Vec<(RecordedObject, f64)> = (numbered.par_iter())
         .map(|(number, object)| {
-            let model = Model { object, prior: &prior, evidence: &evidence, noise: NOISE };
+            let model = Model {
+                object,
+                prior: &prior,
+                evidence: &evidence,
+                noise: NOISE,
+                is_coarse: false,
+            };
             let particles = posterior(&model, seed::stream(seed, *number as u64, "recorded"));
             let x_wo = particles.likeliest(&model).unwrap_or_default();
             let log_evidence = particles.log_evidence - object.bvh.mesh().area_m2().ln();

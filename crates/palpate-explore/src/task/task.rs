@@ -37,6 +37,14 @@ impl Region {
         }
     }
 
+    /// Widest side of the zone, or diameter of the ball, m.
+    pub fn widest_m(&self) -> f64 {
+        match self {
+            Self::Zone(zone) => zone.widest_m(),
+            Self::Ball(ball) => 2.0 * ball.radius_m,
+        }
+    }
+
     /// Number of coordinates of a point of the belief's domain: those of a place, or 3.
     pub fn dimension(&self) -> usize {
         self.zone().map_or(3, Zone::dimension)

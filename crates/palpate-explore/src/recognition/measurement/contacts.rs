@@ -14,7 +14,7 @@
 use super::likelihood::{LogLikelihood, NoiseModel, PointFit, Residual, log_sum_exp};
 use super::touch::{LEVER_M, turn_between};
 use crate::evidence::Contact;
-use crate::recognition::library::{LibraryObject, Nearest};
+use crate::recognition::library::{LibraryObject, Nearest, PlacedObject};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Distance within which contacts have errors in common, m.
@@ -104,10 +104,10 @@ impl ContactSet {
         self.points.iter().map(|point| (point.p_w, point.normal_w))
     }
 
-    /// Returns the residuals for `object` at the pose `x_wo`.
-    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> Vec<PointFit> {
+    /// Returns the residuals for an object at a pose.
+    pub fn fit(&self, placed: &PlacedObject) -> Vec<PointFit> {
         let fit = |point: &RecordedPoint| {
-            let (distance, Nearest { face_w, .. }) = Residual::of_point(object, x_wo, &point.p_w);
+            let (distance, Nearest { face_w, .. }) = Residual::of_point(placed, &point.p_w);
             let turn = point.normal_w.map(|to_w| (turn_between(&face_w, &to_w), face_w));
             PointFit { distance, turn }
         };
@@ -175,7 +175,7 @@ impl ContactSet {
 
     /// Returns the errors for `object` at the pose `x_wo`.
     pub fn errors(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> ContactErrors {
-        let fit = self.fit(object, x_wo);
+        let fit = self.fit(&PlacedObject::exact(object, x_wo));
         let logs = self.log_likelihoods(&fit, 0.0);
         let sum = log_sum_exp(&logs);
         let [mut sd_m, mut offset_m] = [0.0; 2];

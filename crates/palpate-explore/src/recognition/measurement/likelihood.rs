@@ -1,6 +1,6 @@
 //! Log-likelihood ratios of residuals with their derivatives by a pose.
 
-use crate::recognition::library::{LibraryObject, Nearest};
+use crate::recognition::library::{Nearest, PlacedObject};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 /// Length below which a direction is rounding, m.
@@ -51,21 +51,17 @@ impl Residual {
         Self { value_m, slope: Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z) }
     }
 
-    /// Returns the distance of `p_w` from the surface of an object at the pose `x_wo`, and the
-    /// nearest point.
-    pub fn of_point(
-        object: &LibraryObject,
-        x_wo: &Isometry3<f64>,
-        p_w: &Point3<f64>,
-    ) -> (Self, Nearest) {
-        let nearest = object.nearest(x_wo, p_w);
+    /// Returns the distance of `p_w` from the surface of an object at a pose, and the nearest
+    /// point.
+    pub fn of_point(placed: &PlacedObject, p_w: &Point3<f64>) -> (Self, Nearest) {
+        let nearest = placed.nearest(p_w);
         let Nearest { q_w, face_w, distance_m } = &nearest;
         // Close to the surface the direction is rounding; the face has it.
         let n = match distance_m.abs() > ROUNDING_M {
             true => (p_w - q_w) / *distance_m,
             false => *face_w,
         };
-        (Self::along(*distance_m, &-n, q_w, x_wo), nearest)
+        (Self::along(*distance_m, &-n, q_w, placed.x_wo), nearest)
     }
 }
 

@@ -10,9 +10,9 @@ pub use likelihood::{LogLikelihood, NoiseModel, log_sum_exp};
 pub use touch::{LEVER_M, TouchMeasurement, before_m, hull};
 pub use view::ViewMeasurement;
 
-use super::library::LibraryObject;
+use super::library::PlacedObject;
 use likelihood::{PointFit, Residual};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
 use touch::TouchFit;
 
@@ -49,12 +49,12 @@ impl Measurement {
         contacts.into_iter().flatten().chain(touch)
     }
 
-    /// Returns the residuals for `object` at the pose `x_wo`.
-    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> MeasurementFit {
+    /// Returns the residuals for an object at a pose.
+    pub fn fit(&self, placed: &PlacedObject) -> MeasurementFit {
         match self {
-            Self::Contacts(contacts) => MeasurementFit::Contacts(contacts.fit(object, x_wo)),
-            Self::Touch(touch) => MeasurementFit::Touch(touch.fit(object, x_wo)),
-            Self::View(view) => MeasurementFit::View(view.fit(object, x_wo)),
+            Self::Contacts(contacts) => MeasurementFit::Contacts(contacts.fit(placed)),
+            Self::Touch(touch) => MeasurementFit::Touch(touch.fit(placed)),
+            Self::View(view) => MeasurementFit::View(view.fit(placed)),
         }
     }
 

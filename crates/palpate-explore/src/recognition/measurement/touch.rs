@@ -13,7 +13,7 @@
 
 use super::likelihood::{LogLikelihood, NoiseModel, PointFit, Residual, Terms, inflation};
 use crate::evidence::{Contact, End, FreeVolume, Outcome};
-use crate::recognition::library::{LibraryObject, Nearest};
+use crate::recognition::library::{Nearest, PlacedObject};
 use crate::robot::Finger;
 use crate::robot::sensor::GelPad;
 use crate::task::any_orthogonal;
@@ -48,13 +48,18 @@ struct TouchedPoint {
     range_m: f64,
 }
 
-/// Evidence of one touch.
-pub struct TouchMeasurement {
-    /// Hull at the start of its way.
+/// Way of a hull that was found free.
+struct FreeWay {
+    /// Hull at its start.
     hull: Capsule,
     ahead_w: UnitVector3<f64>,
-    /// Length of the way that was found free, m.
-    free_m: f64,
+    length_m: f64,
+}
+
+/// Evidence of one touch.
+pub struct TouchMeasurement {
+    /// Way of the hull; `None` of a contact whose approach is not known.
+    way: Option<FreeWay>,
     /// Depth by which the hull yields at contact, m.
     slack_m: f64,
     /// Points of contact; none for a miss.
@@ -72,18 +77,31 @@ pub struct TouchFit {
 }
 
 impl TouchMeasurement {
-    /// Returns the measurement of a touch, with a hull that yields by `slack_m` and may have a pad;
-    /// `None` after an overload, and without a hull.
-    pub fn new(outcome: &Outcome, slack_m: f64, pad: Option<&GelPad>) -> Option<Self> {
-        let free = outcome.free().filter(|free| free.end != End::Overload)?;
+    /// Returns the measurement of a touch, with a hull that yields by `slack_m` and may have a pad,
+    /// in a region of the size `region_m`; `None` after an overload, and if nothing was seen.
+    pub fn new(
+        outcome: &Outcome,
+        slack_m: f64,
+        pad: Option<&GelPad>,
+        region_m: f64,
+    ) -> Option<Self> {
+        let Some(free) = outcome.free() else {
+            let points = points(outcome.points(), region_m);
+            let is_seen = outcome.end != End::Overload && !points.is_empty();
+            return is_seen.then_some(Self { way: None, slack_m, points, face_w: Vec::new() });
+        };
+        if free.end == End::Overload {
+            return None;
+        }
         let FreeVolume { finger, p_wt: end_w, ahead_w, .. } = free;
         // The hull starts outside of the region, and the tip ends where it was at contact.
-        let free_m = free.way_m + before_m(finger);
-        let hull = hull(finger, &free.r_wt, end_w - ahead_w.scale(free_m));
+        let length_m = free.way_m + before_m(finger);
+        let hull = hull(finger, &free.r_wt, end_w - ahead_w.scale(length_m));
         let points = points(outcome.points(), free.approach_m);
         let x_wt = Isometry3::from_parts(end_w.coords.into(), free.r_wt);
         let face_w = pad.map(|pad| face_w(pad, &(x_wt * GelPad::x_tp(finger)))).unwrap_or_default();
-        Some(Self { hull, ahead_w: *ahead_w, free_m, slack_m, points, face_w })
+        let way = Some(FreeWay { hull, ahead_w: *ahead_w, length_m });
+        Some(Self { way, slack_m, points, face_w })
     }
 
     /// Returns the point of contact, in `W`, and its normal, if it is known; `None` for a miss.
@@ -91,35 +109,39 @@ impl TouchMeasurement {
         self.points.first().map(|point| (point.p_w, point.normal_w))
     }
 
-    /// Returns the residuals for `object` at the pose `x_wo`.
-    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> TouchFit {
-        let reach_m = self.free_m + self.hull.radius_m;
-        let met = object.sweep(x_wo, &self.hull, &self.ahead_w, reach_m);
+    /// Returns the residuals for an object at a pose.
+    pub fn fit(&self, placed: &PlacedObject) -> TouchFit {
+        let met = self.way.as_ref().and_then(|FreeWay { hull, ahead_w, length_m }| {
+            let hit = placed.sweep(hull, ahead_w, length_m + hull.radius_m)?;
+            let inside_m = length_m - hit.travel_m;
+            Some((hit, hull.radius_m, inside_m, ahead_w))
+        });
         let points: Vec<PointFit> = (self.points.iter())
             .map(|point| {
                 let (distance, Nearest { q_w, face_w, .. }) =
-                    Residual::of_point(object, x_wo, &point.p_w);
+                    Residual::of_point(placed, &point.p_w);
                 // On an edge, the hull's normal lies between those of the faces; and near a thin
                 // plate, a noisy contact is nearest to a face that the hull does not meet.
-                let near_m = 0.5 * self.hull.radius_m + NOISE_SDS * point.sd_m;
-                let is_same = |p_w: &Point3<f64>| (p_w - q_w).norm() < near_m;
+                let is_same = |p_w: &Point3<f64>, radius_m: f64| {
+                    (p_w - q_w).norm() < 0.5 * radius_m + NOISE_SDS * point.sd_m
+                };
                 let normal_w = match &met {
-                    Some(hit) if is_same(&hit.point) => hit.normal,
+                    Some((hit, radius_m, ..)) if is_same(&hit.p_w, *radius_m) => hit.normal_w,
                     _ => face_w,
                 };
                 let turn = point.normal_w.map(|to_w| (turn_between(&normal_w, &to_w), normal_w));
                 PointFit { distance, turn }
             })
             .collect();
-        let of_hull = met.filter(|hit| hit.travel_m < self.free_m).map(|hit| {
-            // The turn of the normal is left out of the slope: it only counts deep inside.
-            let facing = (-hit.normal.dot(&self.ahead_w)).max(0.0);
-            let value_m = (self.free_m - hit.travel_m) * facing;
-            Residual::along(value_m, &hit.normal, &hit.point, x_wo)
-        });
+        let of_hull =
+            met.filter(|(_, _, inside_m, _)| *inside_m > 0.0).map(|(hit, _, inside_m, ahead_w)| {
+                // The turn of the normal is left out of the slope: it only counts deep inside.
+                let facing = (-hit.normal_w.dot(ahead_w)).max(0.0);
+                Residual::along(inside_m * facing, &hit.normal_w, &hit.p_w, placed.x_wo)
+            });
         let of_face = self.face_w.iter().filter_map(|p_w| {
-            let Nearest { q_w, face_w, distance_m } = object.nearest(x_wo, p_w);
-            let inside = || Residual::along(-distance_m, &face_w, &q_w, x_wo);
+            let Nearest { q_w, face_w, distance_m } = placed.nearest(p_w);
+            let inside = || Residual::along(-distance_m, &face_w, &q_w, placed.x_wo);
             (distance_m < 0.0).then(inside)
         });
         let deepest =
@@ -227,6 +249,7 @@ fn points(contacts: &[Contact], whole_m: f64) -> Vec<TouchedPoint> {
 mod tests {
     use super::*;
     use crate::evidence::Evidence;
+    use crate::recognition::library::LibraryObject;
     use crate::recognition::pose_prior::moved;
     use crate::task::{Aim, Ball};
     use nalgebra::Vector6;
@@ -257,7 +280,7 @@ mod tests {
         let free = FreeVolume::new(finger, &approach, p_wt, end);
         let points = is_contact.then(|| Evidence::Points(contact.into()));
         let evidence = points.into_iter().chain([Evidence::Free(free)]).collect();
-        TouchMeasurement::new(&Outcome::new(end, evidence), 0.0, None).unwrap()
+        TouchMeasurement::new(&Outcome::new(end, evidence), 0.0, None, 0.1).unwrap()
     }
 
     /// The angle between normals is that of the rotation, for opposite ones too.
@@ -292,7 +315,7 @@ mod tests {
                 let mut sum = LogLikelihood::zero();
                 let mut by = Vector6::zeros();
                 by[axis] = by_m;
-                let fit = evidence.fit(&object, &moved(&x_wo, &by));
+                let fit = evidence.fit(&PlacedObject::exact(&object, &moved(&x_wo, &by)));
                 evidence.add(&fit, &NOISE, tau_m, &mut sum);
                 sum
             };
@@ -319,7 +342,7 @@ mod tests {
             prop_assume!(Vector3::from(from).norm() > 0.01);
             let (object, evidence) = (ellipsoid(), touch(p_w, from, is_contact));
             let x_wo = Isometry3::from(Vector3::from(offset));
-            let fits = [x_wo, Isometry3::identity()].map(|x_wo| evidence.fit(&object, &x_wo));
+            let fits = [x_wo, Isometry3::identity()].map(|x_wo| evidence.fit(&PlacedObject::exact(&object, &x_wo)));
             for tau_m in [0.0, 1e-3, 1e3] {
                 let values = fits.each_ref().map(|fit| {
                     let mut sum = LogLikelihood::zero();

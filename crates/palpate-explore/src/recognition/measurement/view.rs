@@ -10,9 +10,9 @@
 //! peaks of its integrand (Laplace).
 
 use super::likelihood::{LogLikelihood, NoiseModel, Residual, inflation};
-use crate::recognition::library::LibraryObject;
+use crate::recognition::library::PlacedObject;
 use crate::view::{CorrectedElement, ERRORS, SeenSurface};
-use nalgebra::{Cholesky, Isometry3, Point3, SMatrix, SVector, Vector3};
+use nalgebra::{Cholesky, Point3, SMatrix, SVector, Vector3};
 use std::f64::consts::TAU;
 
 /// Largest number of points of a view.
@@ -65,8 +65,8 @@ impl ViewMeasurement {
     }
 
     /// Returns the distances of its points from `object` at the pose `x_wo`.
-    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> Vec<Residual> {
-        self.points.iter().map(|point| Residual::of_point(object, x_wo, &point.p_w).0).collect()
+    pub fn fit(&self, placed: &PlacedObject) -> Vec<Residual> {
+        self.points.iter().map(|point| Residual::of_point(placed, &point.p_w).0).collect()
     }
 
     /// Adds the log-likelihood ratio of distances at the temperature `tau_m`.
@@ -211,8 +211,9 @@ struct Share {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recognition::library::LibraryObject;
     use crate::recognition::pose_prior::moved;
-    use nalgebra::Vector6;
+    use nalgebra::{Isometry3, Vector6};
     use palpate_geometry::mesh::Mesh;
     use palpate_geometry::solids::box_mesh;
     use proptest::prelude::*;
@@ -242,7 +243,7 @@ mod tests {
 
     fn ratio(view: &ViewMeasurement, x_wo: &Isometry3<f64>) -> LogLikelihood {
         let mut sum = LogLikelihood::zero();
-        view.add(&view.fit(&cube(), x_wo), &NOISE, 0.0, &mut sum);
+        view.add(&view.fit(&PlacedObject::exact(&cube(), x_wo)), &NOISE, 0.0, &mut sum);
         sum
     }
 
@@ -250,7 +251,7 @@ mod tests {
     /// error.
     fn both_logs(heights_m: &[f64], shift_m: f64) -> [f64; 2] {
         let view = view(heights_m, shift_m);
-        let fit = view.fit(&cube(), &Isometry3::identity());
+        let fit = view.fit(&PlacedObject::exact(&cube(), &Isometry3::identity()));
         let sds_m = vec![1e-3f64.hypot(5e-4) * inflation(heights_m.len()); heights_m.len()];
         let step = 0.01;
         let integrand = |i: i32| {
