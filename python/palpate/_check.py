@@ -31,6 +31,7 @@ class Check:
 
     verdict: str
     remarks: list[str]
+    _failures: list[str]
     _table: dict[str, list[Any]]
     _text: str
     _svg: str | None = None
@@ -47,19 +48,15 @@ class Check:
             AssertionError: if a planner is worse, missing or undecided.
         """
         if not self.passed:
-            raise AssertionError("\n".join([*(self._failures() or [self.verdict]), *self.remarks]))
+            lines = self._failures or [self.verdict]
+            others = [remark for remark in self.remarks if not any(remark in line for line in lines)]
+            raise AssertionError("\n".join([*lines, *others]))
 
     def table(self) -> pd.DataFrame:
         """Returns a row per planner and measure: change and its 95 % interval, percent; verdict; trials."""
         import pandas as pd
 
         return pd.DataFrame(self._table)
-
-    def _failures(self) -> list[str]:
-        """Returns a line per measure that does not pass, the worst first: pytest's summary has the first line only."""
-        rows = zip(*(self._table[name] for name in COLUMNS), strict=True)
-        failed = [row for row in rows if row[-2] not in PASSED]
-        return [_line(*row) for row in sorted(failed, key=lambda row: row[-2] != self.verdict)]
 
     def __repr__(self) -> str:
         return f"Check({self.verdict})"
@@ -70,16 +67,6 @@ class Check:
     def _repr_html_(self) -> str:
         shown = picture(self._svg) if self._svg else preformatted(self._text)
         return shown + "".join(f"<p>{escape(remark)}</p>" for remark in self.remarks)
-
-
-#: Columns of the table.
-COLUMNS = ("planner", "measure", "change_percent", "low_percent", "high_percent", "verdict", "trials")
-
-
-def _line(planner: str, measure: str, change: float, low: float, high: float, verdict: str, trials: int) -> str:
-    """Returns a row of the table as text."""
-    numbers = f": {measure} {change:+.1f} % (95 % interval {low:+.1f} to {high:+.1f} %)" if measure else ""
-    return f"{verdict}: {planner}{numbers}, {trials} trials"
 
 
 def check(
@@ -116,6 +103,4 @@ def check(
     if not 1e-4 <= tolerance <= 10:
         raise ValueError(f"tolerance = {tolerance}: allowed is 0.0001 to 10")
     found = loaded._check(os.fspath(baseline), planners, accept, tolerance, max_trials, threads, progress)
-    if found is None:
-        return Check("accepted", [], {}, f"baseline in {os.fspath(baseline)}")
-    return Check(found["verdict"], found["remarks"], found["table"], found["text"], found["svg"])
+    return Check(**{name if name in ("verdict", "remarks") else f"_{name}": value for name, value in found.items()})

@@ -239,7 +239,7 @@ class Experiment:
         max_trials: int,
         threads: int,
         progress: bool | None,
-    ) -> dict[str, Any] | None:
+    ) -> dict[str, Any]:
         core, workers = self._prepared(planners, max_trials, threads, LIMIT_S, False)
 
         with Progress(self.name, progress) as look:

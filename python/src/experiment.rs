@@ -14,7 +14,7 @@ use palpate::experiment::{self, Simulation};
 use palpate::explore::planner::{PlannerFactory, is_external};
 use palpate::report::check;
 use palpate::study::check::{
-    CheckOptions, CheckResult, StoredBaseline, accepted, baseline_rows, run_check,
+    CheckOptions, CheckResult, StoredBaseline, accepted, baseline_rows, failures, run_check,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -148,7 +148,7 @@ impl Experiment {
 
     /// Tests the planners for regressions against the file `baseline`, as the command
     /// `palpate check` does: returns verdict, remarks, and the columns of a table. With a reason to
-    /// `accept`, writes the file instead; returns `None`. With `is_partial`, the baseline's other
+    /// `accept`, writes the file instead, without a table. With `is_partial`, the baseline's other
     /// planners are left alone. The other options are those of `run`.
     #[pyo3(signature = (own, *, baseline, accept, tolerance, threads, is_partial, look, stop))]
     #[allow(clippy::too_many_arguments)]
@@ -163,7 +163,7 @@ impl Experiment {
         is_partial: bool,
         look: Py<PyAny>,
         stop: Py<PyAny>,
-    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+    ) -> PyResult<Bound<'py, PyDict>> {
         let old = match accept.is_some() && !baseline.exists() {
             true => None,
             false => Some(StoredBaseline::read(&baseline).map_err(errors::other)?),
@@ -184,14 +184,23 @@ impl Experiment {
             }
             let run = || run_check(&simulation, &old, &rules, threads, stop, &tick);
             let result = callbacks.watched(py, total, run)?.map_err(errors::other)?;
-            return check_table(py, &self.0, &result, &rules).map(Some);
+            return check_table(py, &self.0, &result, &rules);
         };
         let run = || baseline_rows(&simulation, threads, stop, &tick);
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
         let new = accepted(&simulation, &rows, &why, old.as_ref(), is_partial, &rules);
         let text = new.map_err(errors::other)?.text().map_err(errors::other)?;
         write_whole(&baseline, &text).map_err(errors::other)?;
-        Ok(None)
+        let failed = |name: &String| Some(format!("{name}: {}", failures(&rows, name)?));
+        let found = PyDict::new(py);
+        found.set_item("verdict", "accepted")?;
+        let remarks: Vec<String> = self.0.planners.iter().filter_map(failed).collect();
+        found.set_item("remarks", remarks)?;
+        found.set_item("failures", Vec::<String>::new())?;
+        found.set_item("table", PyDict::new(py))?;
+        found.set_item("text", format!("baseline in {}", baseline.display()))?;
+        found.set_item("svg", None::<String>)?;
+        Ok(found)
     }
 }
 
@@ -259,6 +268,7 @@ fn check_table<'py>(
     let found = PyDict::new(py);
     found.set_item("verdict", check::word(result.verdict()).to_lowercase())?;
     found.set_item("remarks", check::remarks(result, rules, experiment.trials))?;
+    found.set_item("failures", check::failures(result))?;
     found.set_item("table", table)?;
     found.set_item("text", check::table(result).text())?;
     found.set_item("svg", check::draw(&experiment.name, result, rules))?;

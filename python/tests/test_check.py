@@ -85,7 +85,7 @@ def test_pytest_shows_the_numbers_of_a_failure_in_its_summary(experiment, tmp_pa
     )
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_ci.py"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert "AssertionError: missing: random, 0 trials" in done.stdout, done.stdout
+    assert "AssertionError: missing: random: not in the baseline" in done.stdout, done.stdout
     assert "where False = Check(missing).passed" in done.stdout, done.stdout
 
 
@@ -184,3 +184,39 @@ def test_a_planner_with_random_numbers_of_its_own_has_no_baseline(experiment, tm
     with pytest.raises(PalpateError, match="trial 0 differs when it is repeated"):
         palpate.check(experiment, baseline, [Unseeded], accept="first", max_trials=2)
     assert not baseline.exists()
+    # One that came to use its own numbers later is named, whatever the verdict.
+    palpate.check(experiment, baseline, [("test_check:Mine", own.Middle)], accept="first", max_trials=4)
+    later = palpate.check(experiment, baseline, [("test_check:Mine", Unseeded)], max_trials=4)
+    assert any("trial 0 differs when it is repeated" in remark for remark in later.remarks)
+
+
+def test_failed_trials_come_first_and_are_no_baseline(experiment, tmp_path):
+    baseline = tmp_path / "failing.jsonl"
+    with pytest.raises(PalpateError, match="4 of 4 trials failed; the first: .*no idea"):
+        palpate.check(experiment, baseline, [own.Raises], accept="first", max_trials=4)
+    assert not baseline.exists()
+
+    class Half(own.Middle):
+        def __init__(self, zone, rng, seed):
+            super().__init__(zone, rng)
+            self.fails = seed % 2
+
+        def plan(self, belief):
+            if self.fails:
+                raise ValueError("half an idea")
+            return super().plan(belief)
+
+    accepted = palpate.check(experiment, baseline, [("test_check:Mine", Half)], accept="some", max_trials=8)
+    assert any("of 8 trials failed; the first" in remark for remark in accepted.remarks)
+    same = palpate.check(experiment, baseline, [("test_check:Mine", Half)], max_trials=8)
+    assert same.verdict == "identical" and any("as in the baseline" in remark for remark in same.remarks)
+    palpate.check(experiment, baseline, [("test_check:Mine", own.Middle)], accept="whole", max_trials=8)
+    failed = palpate.check(experiment, baseline, [("test_check:Mine", Half)], max_trials=8)
+    assert failed.verdict == "missing"
+    with pytest.raises(AssertionError) as raised:
+        failed.raise_if_worse()
+    first = str(raised.value).splitlines()[0]
+    assert first.startswith("missing: test_check:Mine: ") and "failed that passed in the baseline" in first
+    assert "half an idea" in first and not {"nan", "inf"} & set(str(raised.value).split())
+    with pytest.raises(PalpateError, match="no such baseline; write a new baseline"):
+        palpate.check(experiment, tmp_path / "none.jsonl", [own.Middle])

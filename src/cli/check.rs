@@ -13,7 +13,8 @@ use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{
-    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, baseline_rows, run_check,
+    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, baseline_rows, failures,
+    run_check,
 };
 use crate::study::planners::planners_setting;
 use anyhow::{Context, bail};
@@ -123,10 +124,6 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
         Some(_) if !baseline.exists() => None,
         _ => {
             let path = located(baseline);
-            if !path.exists() {
-                let file = baseline.display();
-                bail!("{file}: no such baseline; write it with --accept REASON");
-            }
             let old = StoredBaseline::read(&path)?;
             old.check_pairs(&path, &experiment)?;
             Some(old)
@@ -159,6 +156,9 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
         write_whole(baseline, &new.text()?)?;
         let mut text = format!("{} in {}", counted(rows.len(), "trial"), baseline.display());
         new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
+        for name in &simulation.experiment().planners {
+            failures(&rows, name).iter().for_each(|it| text += &format!("\n{name}: {it}"));
+        }
         print(&text)?;
         return Ok(Completion::Done);
     }

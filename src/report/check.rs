@@ -56,14 +56,10 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
     }));
     for planner in &held.planners {
         let name = &planner.name;
-        remarks.extend(planner.failed.as_ref().map(|(count, reason)| {
-            format!(
-                "{name}: {} failed that passed in the baseline; the first: {reason}",
-                counted(count, "trial")
-            )
-        }));
+        remarks.extend(planner.remark.as_ref().map(|remark| format!("{name}: {remark}")));
         let is_missing = |first: &&MeasureResult| first.verdict == Verdict::Missing;
-        remarks.extend(planner.judgements.first().filter(is_missing).map(|first| {
+        let unexplained = planner.judgements.first().filter(|_| planner.remark.is_none());
+        remarks.extend(unexplained.filter(is_missing).map(|first| {
             let title = first.judged.title;
             format!(
                 "{name}: the baseline or these trials have no {title}; an earlier version left it out: \
@@ -85,6 +81,37 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
     remarks
 }
 
+/// Returns a line for each thing that does not pass, the worst first: tests show one line only.
+pub fn failures(held: &CheckResult) -> Vec<String> {
+    let mut planners: Vec<&PlannerResult> =
+        held.planners.iter().filter(|planner| problem(planner).is_some()).collect();
+    planners.sort_by_key(|planner| std::cmp::Reverse(planner.verdict));
+    planners.into_iter().flat_map(planner_failures).collect()
+}
+
+fn planner_failures(planner: &PlannerResult) -> Vec<String> {
+    let PlannerResult { name, verdict, trials, .. } = planner;
+    let spoken = |verdict| word(verdict).to_lowercase();
+    let remark = planner.remark.as_ref().filter(|_| *verdict == Verdict::Missing);
+    let mut lines: Vec<_> =
+        remark.iter().map(|remark| format!("{}: {name}: {remark}", spoken(*verdict))).collect();
+    let mut measures = planner.lines();
+    measures.retain(|line| line.2 >= Verdict::Undecided);
+    measures.sort_by_key(|line| std::cmp::Reverse(line.2));
+    lines.extend(measures.into_iter().filter_map(|(title, change, verdict)| {
+        let verdict = spoken(verdict);
+        let trials = counted(*trials, "trial");
+        match change {
+            Some([change, low, high]) => Some(format!(
+                "{verdict}: {name}: {title} {change:+.1} % (95 % interval {low:+.1} to {high:+.1} %), {trials}"
+            )),
+            None if remark.is_some() => None,
+            None => Some(format!("{verdict}: {name}: {title}, {trials}")),
+        }
+    }));
+    lines
+}
+
 /// Formats the whole check as Markdown.
 pub fn markdown(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) -> String {
     let mut text =
@@ -101,8 +128,9 @@ pub fn junit(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) ->
     let name = escape(name);
     let output = |text: String| format!("<system-out>{}</system-out>", escape(&text));
     let case = |planner: &PlannerResult| {
+        let reason = planner_failures(planner).into_iter().next().unwrap_or_default();
         let problem = problem(planner)
-            .map_or(String::new(), |tag| format!("<{tag} message=\"{}\"/>", word(planner.verdict)));
+            .map_or(String::new(), |tag| format!("<{tag} message=\"{}\"/>", escape(&reason)));
         let lines: Vec<String> = rows(planner).iter().map(|row| row[1..].join("  ")).collect();
         format!(
             "    <testcase name=\"{}\" classname=\"palpate.{name}\">{problem}{}</testcase>\n",

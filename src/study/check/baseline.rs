@@ -10,7 +10,11 @@ use palpate_input::format::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// Remedy of a baseline that does not fit.
+const WRITE: &str = "write a new baseline with --accept REASON";
 
 /// First line of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -141,17 +145,19 @@ impl StoredBaseline {
     /// # Errors
     /// If the file cannot be read, or a line is invalid.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        let text =
-            files::text(path, files::TEXT_MAX).map_err(|error| InputError::io(path, error))?;
+        let unread = |error: std::io::Error| match error.kind() {
+            ErrorKind::NotFound => {
+                InputError::new("no such baseline").remedy(WRITE).at(path.display())
+            }
+            _ => InputError::io(path, error),
+        };
+        let text = files::text(path, files::TEXT_MAX).map_err(unread)?;
         let bad = |i: usize| {
             let place = format!("{}:{}", path.display(), i + 1);
             move |error: serde_json::Error| InputError::new(error.to_string()).at(place)
         };
         let mut lines = text.lines().enumerate();
-        let empty = || {
-            InputError::new("the file is empty; write a baseline with --accept REASON")
-                .at(path.display())
-        };
+        let empty = || InputError::new("the file is empty").remedy(WRITE).at(path.display());
         let (_, first) = lines.next().ok_or_else(empty)?;
         let header = serde_json::from_str(first).map_err(bad(0))?;
         let lines = lines.map(|(i, line)| serde_json::from_str(line).map_err(bad(i)));
@@ -187,8 +193,7 @@ impl StoredBaseline {
                 let problem = format!(
                     "`{field}` is {found} in the baseline and {wanted} in the experiment, so trials do not pair"
                 );
-                let mend = "write a new baseline with --accept REASON";
-                return Err(InputError::new(problem).at(path.display()).remedy(mend));
+                return Err(InputError::new(problem).at(path.display()).remedy(WRITE));
             }
         }
         Ok(())

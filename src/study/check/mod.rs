@@ -12,5 +12,6 @@ pub mod sequence;
 pub use baseline::StoredBaseline;
 pub use measures::Verdict;
 pub use regression::{
-    CheckOptions, CheckResult, MeasureResult, PlannerResult, accepted, baseline_rows, run_check,
+    CheckOptions, CheckResult, MeasureResult, PlannerResult, accepted, baseline_rows, failures,
+    run_check,
 };

@@ -34,20 +34,20 @@ pub struct PlannerResult {
     pub verdict: Verdict,
     /// Trials paired with the baseline.
     pub trials: usize,
-    /// Number of trials that failed but did not in the baseline, and the first reason.
-    pub failed: Option<(usize, String)>,
+    /// Remark on the planner, e.g. that trials failed.
+    pub remark: Option<String>,
     /// Result per measure; empty if no trial pairs, or all rows are identical.
     pub judgements: Vec<MeasureResult>,
 }
 
 impl PlannerResult {
-    /// Returns a line per measure: title, change in percent with the ends of its 95 % interval, and
-    /// verdict. A planner without measures has one line, without a title and a change.
+    /// Returns a line per measure: title, change in percent with the ends of its 95 % interval if
+    /// any trial pairs, and verdict. A planner without measures has one line without a title.
     pub fn lines(&self) -> Vec<(&'static str, Option<[f64; 3]>, Verdict)> {
         let line = |it: &MeasureResult| {
             let [low, high] = it.sequence.interval;
             let percent = [it.sequence.mean, low, high].map(|at| it.judged.percent(at));
-            (it.judged.title, Some(percent), it.verdict)
+            (it.judged.title, (it.sequence.count > 0).then_some(percent), it.verdict)
         };
         match self.judgements.is_empty() {
             true => vec![("", None, self.verdict)],
@@ -101,20 +101,33 @@ pub fn run_check(
         first = until;
     }
     let others = baseline.header.planners.iter().filter(|name| !names.contains(name));
-    let planners =
+    let mut planners: Vec<_> =
         names.iter().chain(others).map(|name| planner_of(baseline, rules, &rows, name)).collect();
+    // Random numbers of a planner's own look like a change of the planner.
+    let changed = planners.iter_mut().filter(|it| it.trials > 0 && !it.judgements.is_empty());
+    for result in changed.filter(|it| it.remark.is_none()) {
+        let jobs = simulation.planner(&result.name).map(|planner| vec![(0, planner)]);
+        let again = runner::run_in_memory(simulation, jobs.unwrap_or_default(), 1, stop, &|_| ())?;
+        let again = again.iter().map(|row| TrialLine::of(row, experiment));
+        result.remark = again.filter(|line| !rows.contains(line)).map(|_| UNSEEDED.into()).next();
+    }
     let same_settings = baseline.header.settings == settings_hash(experiment);
     let unreachable_share = simulation.truth().unreachable_share();
     let is_stopped = stop.load(Ordering::Relaxed);
     Ok(CheckResult { planners, same_settings, is_stopped, unreachable_share, rows })
 }
 
+/// Remark on a planner whose trial depends on more than its seed.
+const UNSEEDED: &str = "trial 0 differs when it is repeated; take random numbers from the `rng` \
+    or `seed` of the constructor only";
+
 /// Runs all trials of an experiment for a baseline, and the first of each planner again: a planner
-/// with random numbers of its own has no baseline. Trials not started before `stop` became true are
-/// left out.
+/// with random numbers of its own has no baseline, nor has one that always fails. Trials not
+/// started before `stop` became true are left out.
 ///
 /// # Errors
-/// If a repeated trial differs, a planner is not available, or threads cannot be started.
+/// If a repeated trial differs, all trials of a planner fail, a planner is not available, or
+/// threads cannot be started.
 pub fn baseline_rows(
     simulation: &Simulation,
     threads: usize,
@@ -128,12 +141,33 @@ pub fn baseline_rows(
     for again in runner::run_in_memory(simulation, jobs, threads, stop, &|_| ())? {
         let first = rows.iter().find(|row| row.id() == again.id());
         if first.is_some_and(|first| text(first) != text(&again)) {
-            let problem = format!("planner {}: trial 0 differs when it is repeated", again.planner);
-            let mend = "take random numbers from the `rng` or `seed` of the constructor only";
-            return Err(InputError::new(problem).remedy(mend));
+            return Err(InputError::new(format!("planner {}: {UNSEEDED}", again.planner)));
+        }
+    }
+    for name in &simulation.experiment().planners {
+        let mut own = rows.iter().filter(|row| row.planner == *name).peekable();
+        let is_lost = own.peek().is_some() && own.all(|row| row.failure.is_some());
+        if let Some(failed) = failures(&rows, name).filter(|_| is_lost) {
+            let problem =
+                format!("planner {name}: {failed}; allowed is one that completes a trial");
+            return Err(InputError::new(problem));
         }
     }
     Ok(rows)
+}
+
+/// Says how many trials of a planner failed, and the first reason; `None` if none did.
+pub fn failures(rows: &[TrialRow], name: &str) -> Option<String> {
+    let own: Vec<_> = rows.iter().filter(|row| row.planner == name).collect();
+    let reasons: Vec<_> = own.iter().filter_map(|row| row.failure.as_deref()).collect();
+    failed_of(own.len(), &reasons, "")
+}
+
+/// Says how many of `count` trials failed, how the baseline has them, and the first reason.
+fn failed_of(count: usize, reasons: &[&str], how: &str) -> Option<String> {
+    let first = reasons.first()?;
+    let failed = reasons.len();
+    Some(format!("{failed} of {} failed{how}; the first: {first}", counted(count, "trial")))
 }
 
 /// Returns the baseline of all trials of an experiment that replaces `old`. Its header lists
@@ -198,12 +232,12 @@ fn planner_of(
         .filter(|row| row.planner == name)
         .filter_map(|row| Some((row, baseline.line(row.trial, name)?)))
         .collect();
-    let failures: Vec<&String> = pairs
-        .iter()
-        .filter(|(_, old)| old.failure.is_none())
-        .filter_map(|(new, _)| new.failure.as_ref())
-        .collect();
-    let failed = failures.first().map(|first| (failures.len(), (*first).clone()));
+    let failed_new = |was_failed: bool| -> Vec<&str> {
+        let with = pairs.iter().filter(|(_, old)| old.failure.is_some() == was_failed);
+        with.filter_map(|(new, _)| new.failure.as_deref()).collect()
+    };
+    let lost = failed_of(pairs.len(), &failed_new(false), " that passed in the baseline");
+    let is_lost = lost.is_some();
     let trials = pairs.len();
     let is_identical = trials > 0 && pairs.iter().all(|(new, old)| new.row == old.row);
     let mut judgements = Vec::new();
@@ -212,18 +246,28 @@ fn planner_of(
             let value = |line: &TrialLine| line.values.get(judged.id).copied();
             // Measures without any value are left out.
             let is_known = pairs.iter().any(|(new, old)| value(new).or(value(old)).is_some());
-            let difference =
-                |(new, old): &(&TrialLine, &TrialLine)| Some(value(new)? - value(old)?);
+            let difference = |(new, old): &(&TrialLine, &TrialLine)| {
+                let is_lost = new.failure.is_some() && old.failure.is_none();
+                Some(value(new)? - value(old)?).filter(|_| !is_lost)
+            };
             is_known.then(|| (judged, pairs.iter().filter_map(difference).collect()))
         });
         judgements = rules.evaluate(&differences.collect::<Vec<_>>());
     }
-    let verdict = match (is_identical, &failed) {
+    let verdict = match (is_identical, is_lost) {
         (true, _) => Verdict::Identical,
-        (false, Some(_)) => Verdict::Missing,
-        (false, None) => planner_verdict(&judgements),
+        (false, true) => Verdict::Missing,
+        (false, false) => planner_verdict(&judgements),
     };
-    PlannerResult { name: name.into(), verdict, trials, failed, judgements }
+    let is_known = baseline.header.planners.iter().any(|known| known == name);
+    let unpaired = match is_known {
+        true => "only in the baseline, or none of its trials was run",
+        false => "not in the baseline; add it with --accept REASON",
+    };
+    let remark = lost
+        .or_else(|| failed_of(trials, &failed_new(true), ", as in the baseline"))
+        .or_else(|| (trials == 0).then(|| unpaired.into()));
+    PlannerResult { name: name.into(), verdict, trials, remark, judgements }
 }
 
 /// Result of one measure of one planner, new against old in the same trials.
