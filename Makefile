@@ -238,7 +238,7 @@ cp -r target/doc target/docs-site/rust
 endef
 
 docs: $(PYTHON_INSTALLED) ## The site, target/docs-site; PART=notebooks: runs and saves the notebooks
-	$(if $(filter notebooks,$(PART)),$(PYTHON) python/notebooks/run.py,$(site))
+	$(if $(filter notebooks,$(PART)),$(PYTHON) python/tests/notebooks.py,$(site))
 
 # Parts of a trial, and the share of the machine's peak that each reaches. Others print or draw what docs cite: contacts,
 # strokes, detection and camera the errors and forces of their pages, growth, around and hypotheses the cost over touches

@@ -1,17 +1,10 @@
 """Tests that notebooks run and contain their outputs."""
 
-import sys
-from pathlib import Path
-
 import nbformat
+import notebooks
 import pytest
 
-NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
-sys.path.insert(0, str(NOTEBOOKS))
-
-import run  # noqa: E402
-
-FILES = sorted(NOTEBOOKS.glob("*.ipynb"))
+FILES = sorted(notebooks.FOLDER.glob("*.ipynb"))
 
 
 def pictures(notebook):
@@ -35,7 +28,7 @@ def test_they_are_all_there():
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_notebook_runs_and_warns_of_nothing(file, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    again = run.executed(file)
+    again = notebooks.executed(file)
     assert errors(again) == []
     assert pictures(again) == pictures(nbformat.read(file, as_version=4)) > 0
 

@@ -1,4 +1,4 @@
-"""Runs notebooks and stores their outputs: `python run.py` for all in this folder, or for the named ones."""
+"""Runs notebooks and stores their outputs: `python notebooks.py` for all that are shipped, or for the named ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import nbformat
 from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parents[2] / "experiments/notebooks"
 
 
 def executed(file: Path) -> nbformat.NotebookNode:
@@ -24,7 +24,7 @@ def executed(file: Path) -> nbformat.NotebookNode:
 
 
 def main(files: list[str]) -> None:
-    for file in map(Path, files) if files else sorted(HERE.glob("*.ipynb")):
+    for file in map(Path, files) if files else sorted(FOLDER.glob("*.ipynb")):
         nbformat.write(executed(file), file)
 
 
