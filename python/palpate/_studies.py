@@ -138,9 +138,11 @@ def fit(
     Args:
         contacts: file (.csv, .parquet), or points (n, 3), metres.
         normals: with points, their normals (n, 3) from the surface towards the finger.
-        sd_m: with points, the standard deviation of each, metres.
+        sd_m: with points, the standard deviation of each or of all, metres. They weigh the contacts against each other:
+            their common scale is learned.
         groups: with points, the grasp, posture of the arm or session of each: its contacts have an error in common.
-        heights: fit heights along this axis ("x", "y", "z", "-x", "-y" or "-z") instead of a closed surface.
+        heights: fit heights along this axis ("x", "y", "z", "-x", "-y" or "-z") instead of a closed surface. The belief's
+            places are those of its zone: `belief.zone.from_world(points)` returns the places and heights of points.
         progress: as for `Experiment.run`.
 
     Raises:
@@ -163,6 +165,8 @@ def _contacts(contacts: Any, normals: Any = None, sd_m: Any = None, groups: Any 
     for name, part, shape in zip(("contacts", "normals"), numbers[:2], ("(n, 3)",) * 2, strict=True):
         if part is not None and (part.ndim != 2 or part.shape[1] != 3):
             raise ValueError(f"{name} has shape {part.shape}; allowed is {shape}")
+    if numbers[0] is not None and numbers[2] is not None and numbers[2].ndim == 0:
+        numbers[2] = np.broadcast_to(numbers[2], len(numbers[0]))
     names = None if groups is None else [str(group) for group in groups]
     points, normals, sd_m = (None if part is None else part.tolist() for part in numbers)
     return points, normals, sd_m, names

@@ -5,7 +5,7 @@ use crate::errors;
 use crate::experiment::RunCallbacks;
 use crate::fork;
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::contact_log::{ContactLog, LoggedTouch};
+use palpate::experiment::contact_log::{ContactLog, LoggedTouch, REACH_M};
 use palpate::explore::evidence::Contact;
 use palpate::report::{fit as fit_text, identify as identify_text};
 use palpate::sim::scene::Unit;
@@ -52,6 +52,12 @@ fn of_arrays((points, normals, sds, groups): Arrays) -> PyResult<ContactLog> {
         let normal = normals.as_ref().map(|normals| Vector3::from(normals[i]));
         let unit = normal.map(|normal| normal.try_normalize(1e-9));
         let sd_m = sds.as_ref().map(|sds| sds[i]);
+        if points[i].iter().any(|x| x.abs() > REACH_M) {
+            let words = format!(
+                "contact {i}: allowed is up to {REACH_M} m from the origin; points are in metres"
+            );
+            return Err(PyValueError::new_err(words));
+        }
         let is_finite = points[i].iter().all(|x| x.is_finite());
         if !is_finite || unit == Some(None) || sd_m.is_some_and(|sd_m| !(0.0..=1.0).contains(&sd_m))
         {
@@ -68,6 +74,9 @@ fn of_arrays((points, normals, sds, groups): Arrays) -> PyResult<ContactLog> {
         let group = groups.as_ref().map_or_else(|| (i + 1).to_string(), |groups| groups[i].clone());
         Ok(LoggedTouch { group, contact: Some(Contact { covariance_w, ..contact }), free: None })
     };
+    if count == 0 {
+        return Err(PyValueError::new_err("contacts has 0 rows; allowed are 1 or more"));
+    }
     let touches = (0..count).map(touch).collect::<PyResult<_>>()?;
     Ok(ContactLog { touches, has_groups: groups.is_some(), unread: Vec::new() })
 }

@@ -68,6 +68,36 @@ def test_objects_are_identified_by_points() -> None:
     assert found.object in found.probabilities
 
 
+def test_a_stated_deviation_counts_in_the_prediction_of_its_contact() -> None:
+    random = np.random.default_rng(4)
+    points = ellipsoid(80) + random.normal(0.0, 4e-4, (80, 3))
+    stated = palpate.fit(points, sd_m=4e-4)
+    assert stated.sd_factor < 1.5, "not a factor for what contacts state themselves"
+    rough = np.where(np.arange(80) % 2, 4e-3, 2e-4)
+    table = palpate.fit(ellipsoid(80) + random.normal(0.0, 1.0, (80, 3)) * rough[:, None], sd_m=rough).table()
+    is_rough = rough[table.group.astype(int) - 1] > 1e-3
+    assert table.sd_m[is_rough].median() > 3 * table.sd_m[~is_rough].median()
+    assert table.distance_m[is_rough].median() > 3 * table.distance_m[~is_rough].median()
+
+
+def test_heights_have_places_of_their_zone() -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, 0.1, 9), np.linspace(-0.05, 0.05, 9)))
+    points = np.stack([x, y, 0.3 + 0.2 * x + 0.1 * y], axis=1)
+    belief = palpate.fit(points, heights="z").belief
+    places, heights_m = belief.zone.from_world(points)
+    np.testing.assert_allclose(belief.mean(places), heights_m, atol=2e-4)
+    np.testing.assert_allclose(belief.zone.to_world(places, heights_m), points, atol=1e-12)
+    again = palpate.Belief.from_json(belief.to_json())
+    assert np.array_equal(again.mean(places), belief.mean(places))
+
+
+def test_normals_that_point_inward_are_noticed() -> None:
+    points = ellipsoid(40)
+    normals = points / np.linalg.norm(points, axis=1)[:, None]
+    assert "point inward" not in str(palpate.fit(points, normals=normals))
+    assert "100 % of the normals point inward" in str(palpate.fit(points, normals=-normals))
+
+
 def test_wrong_contacts_are_refused(tmp_path: Path) -> None:
     points = ellipsoid(10)
     with pytest.raises(ValueError, match="shape"):
@@ -76,6 +106,10 @@ def test_wrong_contacts_are_refused(tmp_path: Path) -> None:
         palpate.fit(points, groups=["a", "b", "c"])
     with pytest.raises(ValueError, match="heights = \"up\""):
         palpate.fit(points, heights="up")
+    with pytest.raises(ValueError, match="up to 20 m from the origin"):
+        palpate.fit(1000 * points)
+    with pytest.raises(ValueError, match="0 rows"):
+        palpate.fit(np.zeros((0, 3)))
     with pytest.raises(ValueError, match="finite"):
         palpate.fit(np.full((5, 3), np.nan))
     with pytest.raises(ValueError, match="allowed is one"):

@@ -34,6 +34,13 @@ pub fn sentences(fit: &FitResult, name: &str) -> Vec<String> {
             fit.sd_factor
         ));
     }
+    if fit.inward > 0.5 {
+        sentences.push(format!(
+            "{:.0} % of the normals point inward: correct their signs, they point from the surface to \
+             the finger",
+            100.0 * fit.inward
+        ));
+    }
     if let Some(common_m) = fit.common_m() {
         sentences.push(format!(
             "contacts of a group are off together by {:.2} mm (standard deviation, learned)",

@@ -68,6 +68,9 @@ pub struct FitResult {
     pub sd_factor: f64,
     /// Numbers of contacts used, and in the log.
     pub counts: [usize; 2],
+    /// Share of the normals that point towards the middle of the object, or down from a surface of
+    /// heights.
+    pub inward: f64,
     /// Whether the groups are those of the log; otherwise every so many contacts are one.
     pub has_groups: bool,
 }
@@ -188,7 +191,11 @@ pub fn run(
     let held_out = calibrated.collect();
     let belief = model.belief(used.iter().copied(), sd_factor)?;
     let counts = [contacts.len(), all];
-    Ok(Some(FitResult { belief, held_out, sd_factor, counts, has_groups: *has_groups }))
+    let measured: Vec<&Contact> = contacts.iter().copied().filter(|it| it.has_normal).collect();
+    let is_inward = |it: &&&Contact| it.normal_w.dot(&model.outward(&it.p_wc)) < 0.0;
+    let inward = measured.iter().filter(is_inward).count() as f64 / measured.len().max(1) as f64;
+    let has_groups = *has_groups;
+    Ok(Some(FitResult { belief, held_out, sd_factor, counts, inward, has_groups }))
 }
 
 /// Returns the fold in which each touch is left out: its group, or that of several groups.
@@ -350,8 +357,9 @@ fn held_out<'a>(belief: &Belief, touches: impl Iterator<Item = &'a LoggedTouch>)
     let mesh = belief.implicit_surface().and_then(|it| it.surface()?.mesh(CELLS));
     let mesh = mesh.map(MeshBvh::new);
     let each = touches.filter_map(|touch| {
-        let p_w = touch.contact.as_ref()?.p_wc;
-        let deviation = belief.distance_m(&p_w)?;
+        let contact = touch.contact.as_ref()?;
+        let p_w = contact.p_wc;
+        let deviation = belief.distance_m(&p_w, contact.sd_m())?;
         let nearest = mesh.as_ref().map(|mesh| mesh.closest_point(&p_w).distance_m);
         let distance_m = nearest.unwrap_or(deviation.mean_m.abs());
         Some(HeldOut { group: touch.group.clone(), p_w, deviation, distance_m })

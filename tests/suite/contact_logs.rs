@@ -336,7 +336,7 @@ fn one_trace_predicts_the_others() {
         let fit = run(&spec, &AtomicBool::new(false), &|_, _| {}).unwrap().unwrap();
         let others = part(&log, &group, false).contacts();
         let within = |contact: &&Contact| {
-            let deviation = fit.belief.distance_m(&contact.p_wc).unwrap();
+            let deviation = fit.belief.distance_m(&contact.p_wc, contact.sd_m()).unwrap();
             deviation.mean_m.abs() <= 1.96 * deviation.sd_m
         };
         let count = others.iter().filter(within).count();

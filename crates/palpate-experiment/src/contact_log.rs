@@ -46,7 +46,7 @@ pub struct LoggedTouch {
 
 /// Largest distance of a contact from the origin, m.
 // heuristic: beyond any arm's reach; millimetres that are read as metres are there.
-const REACH_M: f64 = 20.0;
+pub const REACH_M: f64 = 20.0;
 
 impl ContactLog {
     /// Reads a CSV file, with a line of names first, or a Parquet file.

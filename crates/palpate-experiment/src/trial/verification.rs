@@ -39,9 +39,9 @@ pub(super) fn verify(
             outcome.map_err(|fault| format!("verification touch {}: {fault}", rows.len() + 1))?;
         let belief = episode.belief();
         let p_wc = outcome.contact().map(|contact| contact.p_wc);
-        let error = p_wc.and_then(|p_wc| belief.distance_m(&p_wc));
+        let error = p_wc.and_then(|p_wc| belief.distance_m(&p_wc, None));
         let first = again.and_then(|at| touches[at].contact());
-        let before = error.zip(first.and_then(|first| belief.distance_m(&first)));
+        let before = error.zip(first.and_then(|first| belief.distance_m(&first, None)));
         rows.push(VerificationRow {
             target,
             repeats: again.map(|at| at as u32 + 1),

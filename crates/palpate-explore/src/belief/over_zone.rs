@@ -9,6 +9,7 @@ use crate::surface_belief::{
 use crate::surface_evidence::Silhouette;
 use crate::task::{Region, Target};
 use crate::view::{LookOffer, RigidError, SeenSurface};
+use nalgebra::Point3;
 use palpate_geometry::solids::Triangles;
 use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
@@ -65,6 +66,15 @@ impl SurfaceBelief for HeightField {
         let quantiles_m = self.predicted_quantiles_m(places, &predictions, probabilities)?;
         let variances = predictions.iter().map(|prediction| prediction.variance).collect();
         Some(HeightPredictions { variances, quantiles_m })
+    }
+
+    fn distance_m(&self, p_w: &Point3<f64>, sd_m: Option<f64>) -> Option<Deviation> {
+        let (zone, surface) = (&self.zone, self.surface()?);
+        let Deviation { mean_m, sd_m: exact_m } = self.predict(&zone.place(p_w).into())?;
+        let noise_sd = surface.hyperparameters().touch_sd();
+        let further = self.noise_of(sd_m.unwrap_or(0.0)).powi(2) - 1.0;
+        let sd_m = exact_m.hypot(noise_sd * further.max(0.0).sqrt());
+        Some(Deviation { mean_m: zone.height_m(p_w) - mean_m, sd_m })
     }
 
     fn predict(&self, target: &Target) -> Option<Deviation> {

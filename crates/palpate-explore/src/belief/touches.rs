@@ -127,7 +127,12 @@ impl HeightField {
     /// its surface along the normal, over the normal's part along the heights.
     fn noise(&self, contact: &Contact) -> f64 {
         let normal_y = self.zone.x_wz().inverse_transform_vector(&contact.normal_w).y;
-        let sd_m = contact.sd_m().unwrap_or(0.0) / normal_y.max(NORMAL_Y_MIN);
+        self.noise_of(contact.sd_m().unwrap_or(0.0) / normal_y.max(NORMAL_Y_MIN))
+    }
+
+    /// Returns the noise of a height that states the deviation `sd_m`, relative to that of an exact
+    /// one.
+    pub(super) fn noise_of(&self, sd_m: f64) -> f64 {
         (sd_m / self.noise_unit_m()).max(1.0)
     }
 

@@ -154,8 +154,9 @@ pub trait SurfaceBelief: Any + Send + Sync {
     }
 
     /// Returns the distance of `p_w` outside the believed surface, m, with the standard deviation
-    /// of a touch; by default along the heights of a zone. `None` before the first fit.
-    fn distance_m(&self, p_w: &Point3<f64>) -> Option<Deviation> {
+    /// of a touch, whose contact may state the deviation `sd_m`; by default along the heights of a
+    /// zone, and without this statement. `None` before the first fit.
+    fn distance_m(&self, p_w: &Point3<f64>, _sd_m: Option<f64>) -> Option<Deviation> {
         let Region::Zone(zone) = self.region() else { return None };
         let Deviation { mean_m, sd_m } = self.predict(&zone.place(p_w).into())?;
         Some(Deviation { mean_m: zone.height_m(p_w) - mean_m, sd_m })

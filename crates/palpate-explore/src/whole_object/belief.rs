@@ -1,6 +1,7 @@
 //! The belief of a whole object as a surface belief.
 
 use super::ImplicitSurface;
+use super::evidence::noise_factor;
 use super::surface::{Surface, steepness};
 use crate::evidence::{Evidence, Outcome};
 use crate::surface_belief::{
@@ -90,12 +91,13 @@ impl SurfaceBelief for ImplicitSurface {
         }
     }
 
-    fn distance_m(&self, p_w: &Point3<f64>) -> Option<Deviation> {
+    fn distance_m(&self, p_w: &Point3<f64>, sd_m: Option<f64>) -> Option<Deviation> {
         let surface = self.surface()?;
         let sd = surface.sds_m(&[*p_w]).first().copied()?;
         let field = surface.field(p_w);
         let per_m = steepness(&field.gradient);
-        let sd_m = sd.hypot(surface.noise_sd()) / per_m;
+        let noise = noise_factor(sd_m, self.noise_unit_m(self.before()));
+        let sd_m = sd.hypot(noise * surface.noise_sd()) / per_m;
         Some(Deviation { mean_m: field.value / per_m, sd_m })
     }
 
@@ -106,7 +108,7 @@ impl SurfaceBelief for ImplicitSurface {
         let along_m = first_zero([from_m, to_m], |along_m| surface.value(&at(along_m)));
         Some(match along_m {
             Some(along_m) => {
-                Deviation { mean_m: -along_m, sd_m: self.distance_m(&at(along_m))?.sd_m }
+                Deviation { mean_m: -along_m, sd_m: self.distance_m(&at(along_m), None)?.sd_m }
             }
             None => Deviation { mean_m: 0.0, sd_m: ball.radius_m },
         })

@@ -182,8 +182,7 @@ impl SpatialEvidence {
                     false => (is_stroke && sd_m.is_some()).then_some(&common[..]),
                 };
                 let known = loadings.map(|loadings| KnownError { variance: 0.0, source, loadings });
-                let noise = sd_m.filter(|_| !is_stroke);
-                let noise = noise.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
+                let noise = noise_factor(sd_m.filter(|_| !is_stroke), noise_m);
                 let place = place.as_slice();
                 all.push(&Observation { place, height: -field.value, noise, slope, known });
             }
@@ -420,6 +419,12 @@ fn spread<'a>(
     let radii_m = radii_m.map(|radius_m| radius_m.max(THINNEST * ball.radius_m));
     let reaches = points.map(|p_w| (p_w.coords - mean).component_div(&radii_m).norm());
     Some((mean.into(), radii_m * (reaches.sum::<f64>() / count)))
+}
+
+/// Returns the noise of a contact, relative to that of an exact one, whose deviation is `exact_m`;
+/// `sd_m` is the deviation that it states.
+pub(super) fn noise_factor(sd_m: Option<f64>, exact_m: f64) -> f64 {
+    sd_m.map_or(1.0, |sd_m| (sd_m / exact_m).max(1.0))
 }
 
 #[cfg(test)]

@@ -316,6 +316,17 @@ impl ImplicitSurface {
         (prior, observations)
     }
 
+    /// Standard deviation of a contact that counts as exact, m: the noise before a fit.
+    pub(super) fn noise_unit_m(&self, before: Option<&Hyperparameters>) -> f64 {
+        let unknown_m = || SIGNAL * self.estimated_ball().radius_m * self.settings.noise[0];
+        before.map_or_else(unknown_m, |before| before.noise_sd)
+    }
+
+    /// Hyperparameters before the last fit.
+    pub(super) fn before(&self) -> Option<&Hyperparameters> {
+        self.start.as_ref()
+    }
+
     /// Returns the observations relative to a prior mean.
     fn relative_to(
         &self,
@@ -324,11 +335,10 @@ impl ImplicitSurface {
         pose: CameraPose,
     ) -> Observations {
         let ball = self.estimated_ball();
-        let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
         self.evidence.observations(&ObservationModel {
             prior,
             ball: &ball,
-            noise_m: last.map_or(unknown_m, |last| last.noise_sd),
+            noise_m: self.noise_unit_m(last),
             normals: self.normals(),
             free_space_samples: self.settings.free_space_samples,
             pose,

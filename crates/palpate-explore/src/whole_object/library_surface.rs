@@ -54,7 +54,7 @@ impl LibrarySurface {
 
     /// Counts how much better the belief about shapes predicts a contact.
     fn score(&mut self, p_w: &Point3<f64>) {
-        let deviations = [&self.like, &self.alone].map(|belief| belief.distance_m(p_w));
+        let deviations = [&self.like, &self.alone].map(|belief| belief.distance_m(p_w, None));
         if let [Some(like), Some(alone)] = deviations {
             self.log_ratio += self.odds.count([like, alone]);
         }
@@ -164,8 +164,8 @@ impl SurfaceBelief for LibrarySurface {
         self.alone.reaches(target)
     }
 
-    fn distance_m(&self, p_w: &Point3<f64>) -> Option<Deviation> {
-        self.favoured().distance_m(p_w)
+    fn distance_m(&self, p_w: &Point3<f64>, sd_m: Option<f64>) -> Option<Deviation> {
+        self.favoured().distance_m(p_w, sd_m)
     }
 
     fn predict(&self, target: &Target) -> Option<Deviation> {

@@ -140,7 +140,7 @@ fn the_defaults_of_a_belief_are_those_of_a_height_field() {
     for place in &places {
         let p_w = own.region().zone().unwrap().point(place, 0.003);
         for [a, b] in [
-            [&own, &plain].map(|it| it.distance_m(&p_w).unwrap()),
+            [&own, &plain].map(|it| it.distance_m(&p_w, None).unwrap()),
             [&own, &plain].map(|it| it.predict(&place.clone().into()).unwrap()),
         ] {
             near(a.mean_m, b.mean_m);
