@@ -81,6 +81,8 @@ class Zone:
         """Places on an even grid, shape (per_side ** d, d), metres."""
     def to_world(self, places: npt.ArrayLike, heights_m: npt.ArrayLike) -> _Array:
         """Points (..., 3) in the world frame of places (..., d) and heights (...) above the datum, metres."""
+    def from_world(self, points: npt.ArrayLike) -> tuple[_Array, _Array]:
+        """Places (..., d) and heights (...) above the datum of points (..., 3) in the world frame, metres."""
     def _repr_png_(self) -> _Picture | None: ...
     def __copy__(self) -> Zone: ...
     def __deepcopy__(self, _memo: Any) -> Zone: ...
@@ -139,6 +141,17 @@ class Belief:
         """Most likely object of a library with the estimated position (m) and rotation (deg, about the fixed axes x,
         then y, then z) of its mesh; None without a library."""
 
+    def predicted_contacts(
+        self, target: Any, n: int, rng: np.random.Generator
+    ) -> list[tuple[str, tuple[list[float], list[float]] | None]]:
+        """Draws `n` objects with poses from the hypotheses, and predicts the contact of a touch at `target` with each.
+
+        Each has the object's name, and point and normal in the world frame, or None for a miss.
+
+        Raises:
+            ValueError: without a library, or if the target is out of reach.
+        """
+
     @property
     def zone(self) -> Zone:
         """Explored zone."""
@@ -163,8 +176,8 @@ class Belief:
 
         Around an object the draws are of the field.
         """
-    def condition_on_observations(self, points: npt.ArrayLike, heights_m: Sequence[float] | None = None) -> Belief:
-        """Returns the belief after touches with contacts at `points`, with the same hyperparameters.
+    def condition_on_observations(self, points: npt.ArrayLike, heights_m: npt.ArrayLike | None = None) -> Belief:
+        """Returns the belief after touches with contacts at `points`, with the same hyperparameters; hypotheses too.
 
         Over a zone the contacts are at `heights_m`, or where the surface is expected; around an object the points are
         in the world frame.
@@ -192,6 +205,11 @@ class Belief:
         Raises:
             ValueError: for another number of rows, or a number that is not finite.
         """
+    @staticmethod
+    def from_json(json: str) -> Belief:
+        """Reads a belief from JSON, such as belief.json of `palpate fit`."""
+    def to_json(self) -> str:
+        """Returns the belief as JSON, which other versions may not read."""
     def scaled(self, factor: float) -> Belief:
         """Returns the belief with all length scales multiplied by `factor`.
 
@@ -548,7 +566,7 @@ class Experiment:
         is_partial: bool,
         look: Callable[[int, int], None],
         stop: Callable[[], None],
-    ) -> dict[str, Any] | None: ...
+    ) -> dict[str, Any]: ...
     def __copy__(self) -> Experiment: ...
     def __deepcopy__(self, _memo: Any) -> Experiment: ...
 

@@ -25,6 +25,9 @@ class _RecognitionEnv(gymnasium.Env[dict[str, Any], dict[str, Any]]):
 
     metadata: dict[str, Any] = {"render_modes": []}
 
+    #: Largest value of a prediction.
+    _most = 1.0
+
     def __init__(
         self,
         scene: str | os.PathLike[str] | _palpate.Scene = "lookalikes",
@@ -39,13 +42,13 @@ class _RecognitionEnv(gymnasium.Env[dict[str, Any], dict[str, Any]]):
         self._hypotheses = hypotheses
         self.classes = self._core.classes
         action, row = self._core.sizes
-        largest = float(np.finfo(np.float32).max)
         self.action_space = spaces.Dict(
             {
                 "action": spaces.Box(-1.0, 1.0, (action,), np.float32),
-                "prediction": spaces.Box(-largest, largest, (self._predicted(),), np.float32),
+                "prediction": spaces.Box(-self._most, self._most, (self._predicted(),), np.float32),
             }
         )
+        largest = float(np.finfo(np.float32).max)
         seen: dict[str, spaces.Space[Any]] = {
             "touches": spaces.Box(-largest, largest, (touches, row), np.float32),
             "count": spaces.Discrete(touches + 1),
@@ -109,8 +112,8 @@ class _RecognitionEnv(gymnasium.Env[dict[str, Any], dict[str, Any]]):
 class RecogniseEnv(_RecognitionEnv):
     """Classification: which object of the library is it?
 
-    The prediction has a logit for each class; the loss is the cross entropy. `info["prediction"]["target"]` is the
-    number of the true class in `classes`.
+    The prediction has a logit for each class, from -20 to 20; the loss is the cross entropy.
+    `info["prediction"]["target"]` is the number of the true class in `classes`.
 
     Args:
         scene: a scene with a table `[library]`: name, path or `palpate.Scene`.
@@ -119,6 +122,9 @@ class RecogniseEnv(_RecognitionEnv):
         hypotheses: whether "hypotheses", Palpate's own probabilities of the classes and of none of these, are observed.
         settings: any setting of the scene.
     """
+
+    #: A difference of 40 is a probability of 4e-18.
+    _most = 20.0
 
     def _predicted(self) -> int:
         return len(self.classes)

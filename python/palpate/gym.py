@@ -59,7 +59,10 @@ surface counts as the ball's radius); "information", the decrease of the mean lo
 "none", 0, which with `grid=0` fits no belief.
 
 `Palpate/Recognise-v0` and `Palpate/Locate-v0` ask which object of a library it is, and where; see `RecogniseEnv` and
-`LocateEnv`.
+`LocateEnv`. Their actions are dicts, which Stable-Baselines3 does not take; flat ones are
+
+    >>> space = env.action_space
+    >>> flat = gymnasium.wrappers.TransformAction(env, lambda a: spaces.unflatten(space, a), spaces.flatten_space(space))
 """
 
 from __future__ import annotations
@@ -72,6 +75,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -294,7 +298,9 @@ class TouchEnv(gymnasium.Env[_Observation, _Action]):
     def step(
         self, action: _Action
     ) -> tuple[_Observation, float, bool, bool, dict[str, Any]]:
-        """Makes a touch; an episode terminates with its last touch."""
+        """Makes a touch; an episode terminates with its last touch, and is then reset."""
+        if not self._step or self._step["over"][0]:
+            raise ResetNeeded("the episode has ended or not begun: call reset()")
         step = self._all.step(np.asarray(action)[None])
         self._finish(step)
         return self._observation(step), float(step["reward"][0]), bool(step["over"][0]), False, self._info(step)

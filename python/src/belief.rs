@@ -9,7 +9,7 @@ use crate::mesh::triangles_of;
 use crate::pickle::{self, Reduced, Version};
 use crate::picture::{self, Picture};
 use crate::places::{Places, rows, seen_at};
-use crate::recognition;
+use crate::recognition::{self, PredictedContact};
 use crate::zone::Zone;
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyReadonlyArray2};
@@ -24,7 +24,7 @@ use palpate::gp::reduction::VarianceReduction;
 use palpate::report;
 use palpate::study::fit::evidence;
 use palpate::task::{Aim, Region, Target};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
@@ -158,6 +158,17 @@ impl Belief {
         self.0.hypotheses().map(recognition::pose)
     }
 
+    /// Draws `n` objects with poses from the hypotheses, and predicts the contact of a touch at
+    /// `target` with each: name, and point and normal in the world frame or None for a miss.
+    fn predicted_contacts(
+        &self,
+        target: &Bound<'_, PyAny>,
+        n: usize,
+        rng: &Bound<'_, PyAny>,
+    ) -> PyResult<Vec<PredictedContact>> {
+        recognition::predicted_contacts(&self.0, target, n, rng)
+    }
+
     /// Mean height above the datum, metres.
     fn mean<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("mean")?;
@@ -234,6 +245,10 @@ impl Belief {
         rng: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let (places, py) = (self.in_domain(points)?, points.py());
+        if !rng.hasattr("standard_normal")? {
+            let words = "rng: allowed is a NumPy generator, numpy.random.default_rng(seed)";
+            return Err(PyTypeError::new_err(words));
+        }
         let normal = rng.call_method1("standard_normal", ((n, places.each.len()),))?;
         let normal: PyReadonlyArray2<'_, f64> = normal.extract()?;
         let normal: Vec<f64> = normal.as_array().iter().copied().collect();
@@ -264,9 +279,11 @@ impl Belief {
     fn condition_on_observations(
         &self,
         points: &Bound<'_, PyAny>,
-        heights_m: Option<Vec<f64>>,
+        heights_m: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let places = self.in_domain(points)?;
+        let heights_m = heights_m.map(|heights_m| Places::of(heights_m, 1)).transpose()?;
+        let heights_m = heights_m.map(|places| places.each.concat());
         let Some(means) = self.means(&places) else {
             return Err(PyValueError::new_err("the belief has no fit yet"));
         };
@@ -327,8 +344,12 @@ impl Belief {
             evidence.iter().for_each(|evidence| field.add(evidence));
             explore::Belief::from(field)
         };
+        let hypotheses = self.0.hypotheses().cloned().map(|mut hypotheses| {
+            log.contacts().into_iter().for_each(|contact| hypotheses.observe(&contact.into()));
+            hypotheses
+        });
         let fitted = fork::detach(py, || {
-            let mut after = after;
+            let mut after = after.with_hypotheses(hypotheses);
             after.refit().map(|()| after)
         })?;
         fitted.map(Self).map_err(errors::other)
@@ -530,14 +551,25 @@ impl Belief {
         Ok((vertices, triangles, PyArray1::from_vec(py, sds_m)))
     }
 
+    /// Reads a belief from JSON, such as belief.json of `palpate fit`.
     #[staticmethod]
-    fn _restore(py: Python<'_>, version: Version, json: &str) -> PyResult<Self> {
-        pickle::check(&version, "Belief")?;
+    fn from_json(py: Python<'_>, json: &str) -> PyResult<Self> {
         py.detach(|| Known::from_json(json)).map(Self).map_err(errors::other)
     }
 
+    /// Returns the belief as JSON, which other versions may not read.
+    fn to_json(&self) -> PyResult<String> {
+        self.0.to_json().map_err(errors::other)
+    }
+
+    #[staticmethod]
+    fn _restore(py: Python<'_>, version: Version, json: &str) -> PyResult<Self> {
+        pickle::check(&version, "Belief")?;
+        Self::from_json(py, json)
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, (Version, String)>> {
-        let json = slf.get().0.to_json().map_err(errors::other)?;
+        let json = slf.get().to_json()?;
         pickle::reduced(slf, (pickle::version(), json))
     }
 

@@ -101,7 +101,7 @@ impl EpisodeScene {
     ) -> PyResult<Self> {
         drawn.iter().try_for_each(DrawnSetting::check)?;
         let mut settings = scene.settings().clone();
-        let belief = BeliefSettings::read(&settings, belief).map_err(errors::config)?;
+        let belief = BeliefSettings::read(py, &settings, belief)?;
         let mesh = scene.given_mesh(py)?;
         let simulator = scene.simulator().clone();
         fork::detach(py, || {

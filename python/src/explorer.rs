@@ -49,7 +49,7 @@ impl Exploration {
         let module = py.import("palpate._settings")?;
         let sets: Vec<String> =
             module.call_method1("belief_assignments", (settings,))?.extract()?;
-        let belief = BeliefSettings::read(scene.get().settings(), &sets).map_err(errors::config)?;
+        let belief = BeliefSettings::read(py, scene.get().settings(), &sets)?;
         let environment = scene.get().environment();
         let seed = scene.get().seed();
         let (known, truth) = fork::detach(py, || {

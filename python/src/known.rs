@@ -9,6 +9,8 @@ use palpate::experiment::metrics::truth::Truth;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::sim::{Environment, Scene};
+use pyo3::prelude::*;
+use std::path::PathBuf;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
 
@@ -23,19 +25,23 @@ impl BeliefSettings {
     /// Reads the settings of a belief on `scene` from `--set` assignments of an experiment.
     ///
     /// # Errors
-    /// The first invalid setting.
-    pub(crate) fn read(scene: &Scene, sets: &[String]) -> Result<Self, ConfigError> {
+    /// `ConfigError` for the first invalid setting.
+    pub(crate) fn read(py: Python<'_>, scene: &Scene, sets: &[String]) -> PyResult<Self> {
         if sets.is_empty() {
             return Ok(Self::default());
         }
+        let home: PathBuf = py.import("palpate._home")?.getattr("HOME")?.extract()?;
         let scene = scene.to_toml(true);
         let text = format!(
             "name = \"scene\"\nplanners = [\"random\"]\ntrials = 1\ninitial_touches = 1\n\
              touches = 1\nscene = {scene}\n"
         );
-        let loader = Loader::from_text(errors::SETTINGS.as_ref(), text)?;
-        let Experiment { gp, space, .. } = Experiment::from_loader(loader, sets)?;
-        Ok(Self { zone: gp, around: space })
+        let read = || -> Result<Self, ConfigError> {
+            let loader = Loader::from_text(errors::SETTINGS.as_ref(), text)?.with_home(&home);
+            let Experiment { gp, space, .. } = Experiment::from_loader(loader, sets)?;
+            Ok(Self { zone: gp, around: space })
+        };
+        read().map_err(errors::config)
     }
 
     /// Returns a belief without data for `environment`.

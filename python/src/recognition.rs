@@ -4,10 +4,12 @@ use crate::envs;
 use crate::errors;
 use crate::exploration::{EpisodeOptions, ExplorationEnv, ExplorationScene, Reward};
 use crate::fork;
+use crate::known::Known;
 use crate::scene::Scene;
+use crate::target::TargetInput;
 use palpate::experiment::metrics::recognition::NONE;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::recognition::ObjectHypotheses;
+use palpate::explore::recognition::{Hypothesis, ObjectHypotheses};
 use palpate::math::pose::parts;
 use palpate::math::seed;
 use palpate::sim::library::TrueObject;
@@ -29,6 +31,36 @@ pub(crate) fn pose(hypotheses: &ObjectHypotheses) -> (String, [f64; 3], [f64; 3]
     let object = &hypotheses.library().objects()[estimate.object];
     let (position_m, rotation_deg) = parts(&(estimate.x_wo * object.x_om()));
     (object.name.clone(), position_m, rotation_deg)
+}
+
+/// Name of an object, and point and normal of its contact, if there is one.
+pub(crate) type PredictedContact = (String, Option<([f64; 3], [f64; 3])>);
+
+/// Draws `count` objects at poses from the hypotheses of `belief`, and predicts the contact of a
+/// touch at `target` with each.
+///
+/// # Errors
+/// `ValueError` without hypotheses, or if the finger cannot go to the target.
+pub(crate) fn predicted_contacts(
+    belief: &Known,
+    target: &Bound<'_, PyAny>,
+    count: usize,
+    rng: &Bound<'_, PyAny>,
+) -> PyResult<Vec<PredictedContact>> {
+    let Some(hypotheses) = belief.hypotheses() else {
+        return Err(PyValueError::new_err("the scene of the belief has no table [library]"));
+    };
+    let target = TargetInput::of(target)?.in_region(&belief.region());
+    let approach = hypotheses.approach(&target.map_err(PyValueError::new_err)?);
+    let approach = approach.ok_or_else(|| PyValueError::new_err("target: out of reach"))?;
+    let seed: u64 = rng.call_method1("integers", (1_u64 << 63,))?.extract()?;
+    let random = &mut seed::stream(seed, 0, "predicted contacts");
+    let predict = |hypothesis: &Hypothesis| {
+        let name = hypotheses.library().objects()[hypothesis.object].name.clone();
+        let contact = hypotheses.predict(hypothesis, &approach);
+        (name, contact.map(|contact| (contact.p_w.coords.into(), contact.normal_w.into())))
+    };
+    fork::detach(rng.py(), || hypotheses.draw(count, random).iter().map(predict).collect())
 }
 
 /// ExplorationEnv of touches of an object drawn from a library.

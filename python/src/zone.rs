@@ -65,6 +65,20 @@ impl Zone {
         places.reshape_vectors(py, &points, 3)
     }
 
+    /// Places (..., d) and heights (...) above the datum, metres, of points (..., 3) in the world
+    /// frame.
+    fn from_world<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let points = Places::of(points, 3)?;
+        let (places, heights_m): (Vec<_>, Vec<_>) =
+            (points.points_w().iter()).map(|p_w| (self.0.place(p_w), self.0.height_m(p_w))).unzip();
+        let places = points.reshape_vectors(py, &places, self.0.dimension())?;
+        Ok((places, points.reshape(py, heights_m)?))
+    }
+
     #[staticmethod]
     fn _restore(version: Version, json: &str) -> PyResult<Self> {
         pickle::check(&version, "Zone")?;

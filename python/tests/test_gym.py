@@ -159,6 +159,12 @@ def test_what_is_wrong_is_said():
     env.reset(seed=0)
     with pytest.raises(ValueError, match="finite"):
         env.step(np.array([np.nan], dtype=np.float32))
+    while not env.step(env.action_space.sample())[2]:
+        pass
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        env.step(env.action_space.sample())
+    # Files of the package are found, as by experiments.
+    palpate.gym.TouchEnv("bird", gp="experiments/beliefs/objects.toml")
     for wrong in ({"reward": "luck"}, {"render_mode": "ansi"}, {"initial_touches": 0}, {"scene": ["toy", "bird"]}, {"scene": []}):
         with pytest.raises(ValueError):
             palpate.gym.TouchEnv(**wrong)

@@ -14,6 +14,7 @@ FEW = {"library": {"folder": str(palpate.gym.HOME / "models/lookalikes"), "objec
 def test_the_environment_is_one(name):
     env = gymnasium.make(name, touches=3, **FEW)
     check_env(env.unwrapped, skip_render_check=True)
+    assert np.abs(env.action_space.sample()["prediction"]).max() <= 20.0
     first, _ = env.reset(seed=5)
     again, _ = env.reset(seed=5)
     assert all(np.array_equal(first[key], again[key]) for key in first)
@@ -50,6 +51,39 @@ def test_wrong_scenes_and_predictions_are_refused():
         env.step({"action": np.zeros(6, np.float32), "prediction": np.zeros(3)})
     with pytest.raises(ValueError, match="6"):
         env.step({"action": np.zeros(2, np.float32), "prediction": np.zeros(2)})
+
+
+def test_imagined_contacts_change_hypotheses():
+    found = []
+
+    class Imagines:
+        def __init__(self, rng):
+            self.rng = rng
+
+        def plan(self, belief):
+            target = belief.ball.aim([1, 0, 0], at=belief.ball.centre_m)
+            drawn = belief.predicted_contacts(target, 400, self.rng)
+            found.append((belief, drawn))
+            return target
+
+    experiment = palpate.Experiment(scene=palpate.Scene.load("lookalikes", **FEW), touches=3, initial_touches=1)
+    experiment.run([Imagines], trials=1, on_error="raise", progress=False)
+    belief, drawn = found[-1]
+    share = np.mean([name == "box" for name, _ in drawn])
+    named = belief.hypotheses["box"] / (belief.hypotheses["box"] + belief.hypotheses["bottle"])
+    assert abs(share - named) < 0.06
+    # A contact that one object predicts and the other does not favours the first, also if it is added.
+    points = {name: contact[0] for name, contact in drawn if contact is not None}
+    for name, point in points.items():
+        other = "bottle" if name == "box" else "box"
+        for after in (belief.condition_on_observations([point]), belief.add([point])):
+            odds = [known.hypotheses[name] / max(known.hypotheses[other], 1e-300) for known in (belief, after)]
+            assert after.hypotheses != belief.hypotheses
+            if len(points) == 2 and np.linalg.norm(np.subtract(*points.values())) > 0.004:
+                assert odds[1] > odds[0]
+    with pytest.raises(ValueError, match=r"table \[library\]"):
+        toy = palpate.Exploration(palpate.Scene.load("toy"))
+        toy.belief.predicted_contacts([0.0], 3, np.random.default_rng(1))
 
 
 def test_a_planner_sees_hypotheses():
