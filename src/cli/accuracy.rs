@@ -117,6 +117,12 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         let mut lines = [Origin::Reference, Origin::Truth].into_iter().filter_map(level);
         lines.try_for_each(|line| print(&line))?;
     }
+    if is_stopped && result.levels.is_none() && result.effects.is_none() {
+        // Fails if an earlier study is in the folder, which is kept.
+        std::fs::remove_dir(&out).ok();
+        print("stopped before anything was measured; nothing is written")?;
+        return Ok(Completion::Interrupted);
+    }
     write_whole(&out.join("accuracy.json"), &serde_json::to_string_pretty(&result.json(&name))?)?;
     let AccuracyResult { levels, orders, effects, .. } = &result;
     if let Some(svg) = accuracy::draw(levels.as_ref(), orders, effects.as_ref()) {

@@ -186,10 +186,13 @@ function middle() {
 
 // Shows the entries of the legend that this experiment has.
 function showLegend() {
+  find("hidden").hidden = !told.is_played;
+  const hidden = explorer.querySelectorAll("input[name=truth], input[value=error]");
+  for (const input of hidden) input.disabled = told.is_played;
   const paths = data?.planners.flatMap(({ paths, touches }) => paths ?? touches.map(({ path }) => path)) ?? [];
   const has = {
     surface: !told.is_line, line: told.is_line, around: told.is_around, ring: !told.is_around,
-    zone: !told.is_line && !told.is_around, truth: shared.truth, stroke: paths.some((path) => path.length),
+    zone: !told.is_line && !told.is_around, truth: shared.truth && !told.is_played, stroke: paths.some((path) => path.length),
   };
   for (const item of document.querySelectorAll("[data-when]")) item.hidden = !has[item.dataset.when];
 }

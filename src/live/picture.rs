@@ -56,6 +56,7 @@ pub(super) fn state(desk: &Desk) -> Value {
         "question": experiment.question,
         "phase": state.phase,
         "is_real": desk.is_real(),
+        "is_played": is_played,
         "moves": experiment.scene.simulator.moves_finger() || desk.is_real(),
         "is_line": experiment.scene.is_curve(),
         "is_around": experiment.scene.whole_object.is_some(),

@@ -362,7 +362,7 @@ pub fn established(comparison: &PairedComparison) -> Option<&'static str> {
 }
 
 /// Returns a sentence instead of a comparison if there are too few paired trials.
-fn too_few(trials: usize) -> Option<String> {
+pub fn too_few(trials: usize) -> Option<String> {
     (trials < TRIALS_MIN).then(|| {
         let verb = if trials == 1 { "is" } else { "are" };
         format!(

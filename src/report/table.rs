@@ -333,6 +333,10 @@ pub fn digits(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
     }
+    // Rounding of six decimals, as below.
+    if value.abs() < 5e-7 {
+        return "0".into();
+    }
     let power = value.abs().max(1e-9).log10().floor();
     let decimals = (2.0 - power).clamp(0.0, 6.0) as usize;
     format!("{value:.decimals$}")

@@ -129,7 +129,7 @@ fn broken_scenes_are_refused_with_file_line_key_and_remedy() {
         ("x_m", "x_mm", &["scene.toml:7", "zone.x_mm", "did you mean `x_m`"]),
         ("x_m", "datum_y_m = inf\nx_m", &["scene.toml:7", "zone.datum_y_m"]),
         ("[zone]", "[zoen]", &["scene.toml:6", "zoen", "did you mean `zone`"]),
-        ("\"mesh.obj\"", "\"mush.obj\"", &["mush.obj", "cannot be read"]),
+        ("\"mesh.obj\"", "\"mush.obj\"", &["mush.obj", "no such mesh", "[object]"]),
         ("\"mesh.obj\"", "\"\"", &["scene.toml:4", "object.mesh"]),
         ("\"mesh.obj\"", "\".\"", &["cannot be read"]),
         ("\"mesh.obj\"", "\"scene.toml\"", &["scene.toml", "obj, gltf, glb, stl, ply"]),

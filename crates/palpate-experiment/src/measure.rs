@@ -96,7 +96,8 @@ pub static MEASURES: &[Measure] = &[
         .from(Source::Recognition(|it| Some(it.error.as_ref()?.offset?[0])))
         .aggregated(Aggregate::Median)
         .untabled(),
-    measure(Minimise, "rotation_deg", "object rotation error", DEGREES)
+    // A symmetric object's angle means nothing, so that less is not better.
+    measure(Undirected, "rotation_deg", "object rotation error", DEGREES)
         .from(Source::Recognition(|it| Some(it.error.as_ref()?.offset?[1])))
         .aggregated(Aggregate::Median)
         .untabled(),

@@ -170,9 +170,10 @@ impl Simulation {
             _ => (Truth::sample(&environment, per_side, tell), None),
         };
         if environment.task().zone().is_some() && !truth.is_known() {
-            return Err(InputError::new(
-                "no surface in the zone along the approach; check scene.zone and object.position_m",
-            ));
+            let mut known = vec!["check scene.zone and object.position_m".to_owned()];
+            known.extend(environment.notices().iter().cloned());
+            let problem = "no surface in the zone along the approach";
+            return Err(InputError::new(problem).remedy(known.join("; ")));
         }
         looks::check(&experiment, &environment)?;
         let shape = TrueShape::from_environment(&environment);

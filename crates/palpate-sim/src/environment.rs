@@ -125,6 +125,10 @@ impl Environment {
         };
         let object = scene.object.as_ref().ok_or_else(|| missing_part("object"))?;
         tell(&format!("reading {}", object.mesh.display()));
+        if !object.mesh.exists() {
+            let problem = "no such mesh; correct `mesh` in the table [object] of the scene";
+            return Err(InputError::new(problem).at(object.mesh.display()));
+        }
         let (mesh, report) = import_with(
             &object.mesh,
             object.unit.metres_per_unit() * object.scale,

@@ -5,6 +5,7 @@ use crate::experiment::measure::{Direction, MEASURES, Measure, measures_with_col
 use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::equal_error::{EqualError, IntervalEstimate, errors};
 use crate::experiment::store::Run;
+use crate::report::findings::too_few;
 use crate::report::table::{Cell, Column, Table, digits, title_with_unit, with_interval};
 use palpate_input::format::counted;
 
@@ -65,12 +66,16 @@ fn difference(comparison: &PairedComparison) -> Cell {
     let PairedComparison { measure, paired, .. } = comparison;
     let shown = |value: f64| {
         let value = measure.unit.per_si * value;
-        let sign = if value < 0.0 { "\u{2212}" } else { "" };
-        format!("{sign}{}", digits(value.abs()))
+        let size = digits(value.abs());
+        let sign = if value < 0.0 && size != "0" { "\u{2212}" } else { "" };
+        format!("{sign}{size}")
     };
     let mean = with_interval(paired.mean, paired.interval, &shown);
     let words = format!("{mean}, {:.0} %", 100.0 * paired.won);
-    Cell::from(words).with_verdict(paired.interval, 0.0, measure.direction)
+    match too_few(paired.trials) {
+        Some(_) => Cell::from(format!("{words}, {}", counted(paired.trials, "trial"))),
+        None => Cell::from(words).with_verdict(paired.interval, 0.0, measure.direction),
+    }
 }
 
 /// Returns the table of `equal_error.csv`, with a row per planner, baseline and error; a count or
