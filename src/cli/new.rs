@@ -74,7 +74,7 @@ impl Args {
     fn options(&self) -> MeshOptions {
         MeshOptions {
             mesh: self.mesh.clone(),
-            is_beside: self.is_here(),
+            folder: Some(self.out.clone()),
             is_around: self.around,
             side: self.side,
             up: self.up,

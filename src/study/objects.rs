@@ -289,7 +289,7 @@ impl ObjectProtocol {
     ) -> anyhow::Result<Experiment> {
         let options = MeshOptions {
             mesh: mesh.into(),
-            is_beside: false,
+            folder: None,
             is_around: true,
             side: ObjectSide::Front,
             up: Some(self.up),

@@ -163,6 +163,8 @@ fn what_cannot_be_made_an_experiment_is_refused_and_nothing_replaced() {
     assert!(!folder.path().join("egg-scene.toml").exists());
     succeeds(folder.path(), &["new", "egg.ply", "--out", "deep/er"]);
     succeeds(folder.path(), &["show", "deep/er/egg-scene.toml"]);
+    let scene = std::fs::read_to_string(folder.path().join("deep/er/egg-scene.toml")).unwrap();
+    assert!(scene.contains("mesh = \"../../egg.ply\""), "{scene}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use serde_json::Value as Json;
 use std::any::TypeId;
 use std::collections::BTreeMap;
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use toml::{Table, Value};
 
@@ -170,6 +170,13 @@ fn descend(
         }
         _ => {}
     }
+}
+
+/// Returns `path` relative to `folder`, both absolute.
+pub fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let shared = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(path.components().skip(shared)).collect()
 }
 
 #[cfg(test)]

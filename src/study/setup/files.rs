@@ -10,16 +10,17 @@ use palpate_geometry::holes::Hole;
 use palpate_geometry::import::{import_with, statements};
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::math::pose::pose;
+use palpate_input::paths::relative;
 use palpate_input::shipped;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Mesh, and the choices that the user makes about it.
 pub struct MeshOptions {
     /// Mesh file.
     pub mesh: PathBuf,
-    /// Whether the files are written to the working folder, so that a relative path of the mesh
-    /// stays valid.
-    pub is_beside: bool,
+    /// Folder of the files, to which a path of the mesh is relative that is given relative to the
+    /// working folder; `None` for the whole path.
+    pub folder: Option<PathBuf>,
     /// Whether the whole object is explored, instead of a zone on one side.
     pub is_around: bool,
     /// Side that faces the finger.
@@ -209,10 +210,14 @@ impl MeshPlacement {
         let FingerTemplate { body, scene, .. } = options.finger.template(options.is_around);
         let Self { unit, position_m, rotation_deg, .. } = self;
         let (unit, scale) = unit.value;
-        let mesh = match options.mesh.is_relative() && options.is_beside {
-            true => options.mesh.clone(),
-            false => shipped::portable(&options.mesh.canonicalize()?)
-                .map_or_else(|| std::path::absolute(&options.mesh), Ok)?,
+        let mesh = match options.folder.as_deref().filter(|_| options.mesh.is_relative()) {
+            Some(folder) if folder == Path::new(".") => options.mesh.clone(),
+            folder => {
+                let whole = options.mesh.canonicalize()?;
+                let beside = folder.map(|folder| Ok(relative(&whole, &folder.canonicalize()?)));
+                let beside = beside.unwrap_or_else(|| std::path::absolute(&options.mesh));
+                shipped::portable(&whole).map_or(beside, Ok)?
+            }
         };
         let mesh = toml::Value::from(mesh.to_string_lossy().into_owned());
         let mut others = String::new();

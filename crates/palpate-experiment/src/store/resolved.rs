@@ -3,8 +3,9 @@
 use super::io::{RunError, check_equal, write_changed};
 use crate::experiment::Experiment;
 use palpate_input::error::InputError;
+use palpate_input::paths::relative;
 use palpate_input::{files, shipped, tables};
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 use toml_edit::DocumentMut;
 
 /// File of a run's settings with all defaults.
@@ -84,11 +85,4 @@ fn relative_resolved(experiment: &Experiment, folder: &Path) -> String {
     };
     let moved = experiment.with_paths(&mut |path| moved(path).to_string_lossy().into_owned());
     moved.as_ref().map_or_else(|| resolved(experiment), resolved)
-}
-
-/// Returns `path` relative to `folder`, both absolute.
-fn relative(path: &Path, folder: &Path) -> PathBuf {
-    let shared = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
-    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
-    up.chain(path.components().skip(shared)).collect()
 }
