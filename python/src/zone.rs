@@ -13,6 +13,9 @@ use pyo3::prelude::*;
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Zone(pub(crate) task::Zone);
 
+/// Places and heights, metres, in the shape of the points.
+type PlacesAndHeights<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
+
 #[pymethods]
 impl Zone {
     /// Number of coordinates of a target: 1 or 2.
@@ -67,11 +70,12 @@ impl Zone {
 
     /// Places (..., d) and heights (...) above the datum, metres, of points (..., 3) in the world
     /// frame.
-    fn from_world<'py>(
+    #[pyo3(name = "from_world")]
+    fn places_and_heights<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+    ) -> PyResult<PlacesAndHeights<'py>> {
         let points = Places::of(points, 3)?;
         let (places, heights_m): (Vec<_>, Vec<_>) =
             (points.points_w().iter()).map(|p_w| (self.0.place(p_w), self.0.height_m(p_w))).unzip();
