@@ -88,39 +88,43 @@ impl DistanceGrid {
                 let share = i as f64 / count.max(1) as f64;
                 capsule.p0_w + axis * share + direction.scale(travel_m)
             });
-            let nearest =
-                places.map(|p| (self.lower_m(&p), p)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-            let free_m = nearest.0 - capsule.radius_m;
-            if free_m < least_m {
-                let p = nearest.1;
+            let (mut shown_m, mut lower_m, mut nearest) = (f64::INFINITY, f64::INFINITY, None);
+            for p in places {
+                let [shown, lower] = self.distances_m(&p);
+                if shown < shown_m {
+                    (shown_m, nearest) = (shown, Some(p));
+                }
+                lower_m = lower_m.min(lower);
+            }
+            let p = nearest?;
+            if shown_m - capsule.radius_m < least_m {
                 let Field { value, gradient } = self.field(&p);
                 let normal = gradient.try_normalize(1e-9).unwrap_or(-direction.into_inner());
                 return Some(GridHit { travel_m, point: p - normal * value, normal });
             }
-            travel_m += free_m;
+            travel_m += (lower_m - capsule.radius_m).max(least_m);
         }
         None
     }
 
-    /// Lower bound of the distance that the grid shows at `p`, m.
-    fn lower_m(&self, p: &Point3<f64>) -> f64 {
-        let beyond_m = self.beyond_m(p);
-        // The mesh is a margin inside of the grid.
-        if beyond_m > 0.0 { beyond_m + self.margin_m } else { self.field(p).value }
+    /// Returns the distance that the grid shows at `p`, and a lower bound of it, m: the mesh is a
+    /// margin inside of the grid.
+    fn distances_m(&self, p: &Point3<f64>) -> [f64; 2] {
+        let ([scaled, inner], shown_m) = (self.scaled(p), self.field(p).value);
+        let beyond_m = (scaled - inner).norm() * self.cell_m;
+        [shown_m, if beyond_m > 0.0 { beyond_m + self.margin_m } else { shown_m }]
     }
 
-    /// Distance of `p` from the grid, m.
-    fn beyond_m(&self, p: &Point3<f64>) -> f64 {
-        let high = Vector3::from(self.corners.map(|count| (count - 1) as f64 * self.cell_m));
-        let inside = p - self.low;
-        (inside - inside.sup(&Vector3::zeros()).inf(&high)).norm()
+    /// Returns `p`, and the point of the grid nearest to it, in cells from the first corner.
+    fn scaled(&self, p: &Point3<f64>) -> [Vector3<f64>; 2] {
+        let last = Vector3::from(self.corners.map(|count| (count - 1) as f64));
+        let scaled = (p - self.low) / self.cell_m;
+        [scaled, scaled.sup(&Vector3::zeros()).inf(&last)]
     }
 
     /// Returns the interpolated distance at `p`, m, with its gradient.
     pub fn field(&self, p: &Point3<f64>) -> Field {
-        let last = Vector3::from(self.corners.map(|count| (count - 1) as f64));
-        let scaled = (p - self.low) / self.cell_m;
-        let inner = scaled.sup(&Vector3::zeros()).inf(&last);
+        let [scaled, inner] = self.scaled(p);
         let [i, j, k]: [usize; 3] =
             std::array::from_fn(|axis| (inner[axis] as usize).min(self.corners[axis].max(2) - 2));
         let [u, v, w] = [inner.x - i as f64, inner.y - j as f64, inner.z - k as f64];
@@ -194,7 +198,7 @@ mod tests {
             from in prop::array::uniform3(-1f64..1.0),
             to in prop::array::uniform3(-0.07f64..0.07),
             axis in prop::array::uniform3(-0.1f64..0.1),
-            radius_m in 0.002f64..0.01,
+            radius_m in 0.002f64..0.03,
         ) {
             static BALL: LazyLock<(MeshBvh, DistanceGrid)> = LazyLock::new(ball);
             let (bvh, grid) = &*BALL;
